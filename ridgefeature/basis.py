@@ -1,0 +1,144 @@
+"""B-spline basis functions on any knots, vectorised in numpy.
+
+Source: Piegl and Tiller, The NURBS Book, chapters 2 and 9; the recursion is Cox and de Boor's.
+No compiled code here: what a CAD script imports must stay light and survive a module reload.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+def clamped_knots(breaks: ArrayLike, degree: int) -> Floats:
+    """Knots (n_breaks + 2 degree,) with simple interior knots and each end repeated degree + 1 times.
+
+    `breaks` (n_breaks,) ascend strictly, at least two. Raises ValueError otherwise.
+    """
+    b = np.asarray(breaks, dtype=np.float64)
+    _check_degree(degree)
+    if b.ndim != 1 or b.size < 2 or not np.all(np.diff(b) > 0) or not np.all(np.isfinite(b)):
+        raise ValueError(
+            f"expected two or more finite breaks, strictly ascending, got {_brief(b)}; sort them"
+        )
+    return np.concatenate([np.full(degree, b[0]), b, np.full(degree, b[-1])])
+
+
+def greville(knots: ArrayLike, degree: int) -> Floats:
+    """Greville abscissae (n_poles,): the mean of `degree` consecutive knots for each pole."""
+    k, _ = checked_knots(knots, degree)
+    n = k.size - degree - 1
+    windows = np.lib.stride_tricks.sliding_window_view(k[1:-1], degree)
+    return np.clip(windows.mean(axis=1), k[degree], k[n])  # a mean of equal knots may round outwards
+
+
+def basis_matrix(knots: ArrayLike, degree: int, at: ArrayLike, derivative: int = 0) -> Floats:
+    """Values, or derivatives of the given order, of all basis functions: (len(at), n_poles), dense.
+
+    `at` (m,) lies in the domain [knots[degree], knots[n_poles]], else ValueError; a NaN gives NaN in its row.
+    """
+    k, _ = checked_knots(knots, degree)
+    t = np.atleast_1d(np.asarray(at, dtype=np.float64))
+    if t.ndim != 1:
+        raise ValueError(f"expected parameters of shape (m,), got {t.shape}; pass at.ravel()")
+    first, values = local_basis(k, degree, t, derivative)
+    matrix = np.zeros((t.size, k.size - degree - 1))
+    np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values, axis=1)
+    return matrix
+
+
+def interpolate(knots: ArrayLike, degree: int, values: ArrayLike) -> Floats:
+    """Poles (n_poles, ...) of the spline that takes `values` (n_poles, ...) at the Greville abscissae.
+
+    A linear map of the values; polynomials up to the degree are reproduced. Raises ValueError when the
+    number of values is not the number of poles.
+    """
+    sites = greville(knots, degree)
+    v = np.asarray(values, dtype=np.float64)
+    if v.ndim == 0 or v.shape[0] != sites.size:
+        raise ValueError(
+            f"expected {sites.size} values, one for each Greville abscissa, got shape {v.shape}; "
+            "sample at greville(knots, degree)"
+        )
+    matrix = basis_matrix(knots, degree, sites)
+    return np.linalg.solve(matrix, v.reshape(sites.size, -1)).reshape(v.shape)
+
+
+def local_basis(
+    knots: Floats, degree: int, at: Floats, derivative: int = 0
+) -> tuple[NDArray[np.intp], Floats]:
+    """The degree + 1 basis functions that do not vanish at each parameter.
+
+    `knots` as checked_knots returns them, `at` (m,). Returns (first, values): index of the first of them
+    (m,), values (m, degree + 1). ValueError outside the domain; NaN in, NaN out.
+    """
+    if derivative < 0:
+        raise ValueError(f"expected a derivative order of 0 or more, got {derivative}")
+    t, nan = _inside(knots, degree, at)
+    n = knots.size - degree - 1
+    last = np.searchsorted(knots, knots[n], side="left") - 1  # the last span that is not empty
+    span = np.minimum(np.searchsorted(knots, t, side="right") - 1, last)
+    values = np.zeros((t.size, degree + 1))
+    if derivative <= degree:
+        values[:, 0] = 1.0
+    for q in range(1, degree + 1):
+        old = values[:, :q].copy()
+        values[:, : q + 1] = 0.0
+        for r in range(q):
+            left, right = knots[span - q + 1 + r], knots[span + 1 + r]
+            share = old[:, r] / (right - left)  # this difference contains the span, so it is never zero
+            if q > degree - derivative:  # the topmost steps of the recursion differentiate
+                values[:, r] -= q * share
+                values[:, r + 1] += q * share
+            else:
+                values[:, r] += (right - t) * share
+                values[:, r + 1] += (t - left) * share
+    values[nan] = np.nan
+    return span - degree, values
+
+
+def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> tuple[Floats, int]:
+    """Knots as a read-only float64 copy, and the number of poles; ValueError when they do not fit."""
+    _check_degree(degree)
+    k = np.array(knots, dtype=np.float64)
+    if k.ndim != 1 or k.size < 2 * (degree + 1):
+        raise ValueError(
+            f"expected at least {2 * (degree + 1)} knots for degree {degree}, got shape {k.shape}"
+        )
+    n = k.size - degree - 1
+    if n_poles is not None and n != n_poles:
+        raise ValueError(
+            f"expected {n_poles + degree + 1} knots for {n_poles} poles of degree {degree}, got {k.size}; "
+            "write repeated knots out, n_knots = n_poles + degree + 1"
+        )
+    if not np.all(np.isfinite(k)) or not np.all(np.diff(k) >= 0):
+        raise ValueError(f"expected finite knots in ascending order, got {_brief(k)}; sort them")
+    if np.any(k[degree + 1 :] - k[: -degree - 1] <= 0):
+        raise ValueError(f"expected no knot more than {degree + 1} times, got {_brief(k)}; drop repeats")
+    k.setflags(write=False)
+    return k, n
+
+
+def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Parameters clipped to the domain by no more than rounding, and which of them were NaN."""
+    low, high = knots[degree], knots[knots.size - degree - 1]
+    nan = np.isnan(at)
+    slack = 1e-12 * max(high - low, abs(low), abs(high))
+    outside = (at < low - slack) | (at > high + slack)
+    if outside.any():
+        raise ValueError(
+            f"expected parameters from {low:g} to {high:g}, got {at[outside][0]:.12g}; stay within the domain"
+        )
+    return np.where(nan, low, np.clip(at, low, high)), nan
+
+
+def _check_degree(degree: int) -> None:
+    if not isinstance(degree, (int, np.integer)) or degree < 1:
+        raise ValueError(f"expected a degree of 1 or more, got {degree!r}")
+
+
+def _brief(a: Floats) -> str:
+    text = np.array2string(a, threshold=8, edgeitems=3, precision=4)
+    return f"{' '.join(text.split())} of shape {a.shape}"
