@@ -116,13 +116,13 @@ def test_arc_length_and_its_inverse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     knots = random_knots(rng, 3)
     n = knots.size - 4
-    curve = Curve(np.column_stack([np.arange(n), *rng.normal(size=(2, n))]), knots, 3)
+    curve = Curve(np.column_stack([np.arange(n), *rng.normal(scale=0.5, size=(2, n))]), knots, 3)
     t = np.sort(rng.uniform(*curve.domain, 20))
     s = curve.arc_length(t1=t)
     assert np.all(np.diff(s) > 0)
     np.testing.assert_allclose(curve.at_arc_length(s), t, atol=1e-9)
     chords = np.linalg.norm(np.diff(curve(t), axis=0), axis=1)
-    assert np.all(chords <= np.diff(s) + 1e-12)
+    assert np.all(chords <= np.diff(s) + 1e-9)
 
 
 def test_surface_is_scipys_tensor_product() -> None:
