@@ -1,0 +1,264 @@
+"""Kernels of one template against scan points, in the template's frame (x along, y across, z up).
+
+The residual of a point is its height over the ridge section, divided by the length of its gradient: the
+first-order distance to the surface (Sampson 1982). Parameters are ordered
+
+    t_x t_y t_z   translation in the start frame
+    o_x o_y o_z   rotation vector about the start frame's origin
+    height, width
+
+`table` holds the section as cubics, one row a span: coefficients of 1, x, x^2, x^3 with x in [0, 1).
+`trend` (3,) holds what the neighbours tell and the fit takes as given: the curvature of the path (y is measured
+from the osculating circle, to second order), and the slopes of height and width along x. A template alone has
+zeros.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+HUBER, TUKEY, SQUARE, CAUCHY = 0, 1, 2, 3
+
+
+@njit(cache=True, inline="always")
+def residual_jet(x, y, z, height, width, trend, table):
+    """Residual and its derivatives with respect to x, y, z, height and width."""
+    spans = table.shape[0]
+    across = 1.0 / max(1.0 - trend[0] * y, 0.2)
+    lean = trend[0] * x * across
+    y -= 0.5 * lean * x
+    height += trend[1] * x
+    inverse_width = 1.0 / max(width + trend[2] * x, 0.1 * width)
+    eta = y * inverse_width
+    position = (eta + 0.5) * spans
+    if not 0.0 <= position < spans:
+        return z, 0.0, 0.0, 1.0, 0.0, 0.0
+    span = int(position)
+    t = position - span
+    b, c, d = table[span, 1], table[span, 2], table[span, 3]
+    g = table[span, 0] + t * (b + t * (c + t * d))
+    per_y = spans * inverse_width
+    slope = per_y * (b + t * (2.0 * c + 3.0 * t * d))
+    f1 = height * slope
+    f2 = height * per_y * per_y * (2.0 * c + 6.0 * t * d)
+    square = 1.0 / (1.0 + f1 * f1)
+    inverse = math.sqrt(square)
+    r = (z - height * g) * inverse
+    bend = r * f1 * square
+    r_y = -f1 * inverse - bend * f2
+    r_h = -g * inverse - bend * slope
+    r_w = eta * f1 * inverse + bend * (eta * f2 + f1 * inverse_width)
+    r_x = -r_y * lean + r_h * trend[1] + r_w * trend[2]
+    r_y *= 1.0 - 0.5 * lean * lean
+    return r, r_x, r_y, inverse, r_h, r_w
+
+
+@njit(cache=True, inline="always")
+def loss_jet(x, loss, tuning):
+    """Loss rho(x), its derivative psi(x) and the weight psi(x) / x, for a residual in units of its scale."""
+    if loss == TUKEY:
+        if abs(x) >= tuning:
+            return tuning * tuning / 6.0, 0.0, 0.0
+        q = 1.0 - (x / tuning) ** 2
+        return tuning * tuning / 6.0 * (1.0 - q * q * q), x * q * q, q * q
+    if loss == HUBER:
+        if abs(x) <= tuning:
+            return 0.5 * x * x, x, 1.0
+        return tuning * (abs(x) - 0.5 * tuning), math.copysign(tuning, x), tuning / abs(x)
+    if loss == CAUCHY:
+        q = 1.0 + (x / tuning) ** 2
+        return 0.5 * tuning * tuning * math.log(q), x / q, 1.0 / q
+    return 0.5 * x * x, x, 1.0
+
+
+@njit(cache=True)
+def rotation_of(vector):
+    """Rotation matrix (columns: new axes in the old frame) and right Jacobian of a rotation vector."""
+    x, y, z = vector[0], vector[1], vector[2]
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < 1e-4:
+        a = 1.0 - square / 6.0
+        b = 0.5 - square / 24.0
+        c = 1.0 / 6.0 - square / 120.0
+    else:
+        a = math.sin(angle) / angle
+        b = (1.0 - math.cos(angle)) / square
+        c = (1.0 - a) / square
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    square_skew = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                square_skew[i, j] += skew[i, k] * skew[k, j]
+    rotation = np.eye(3) + a * skew + b * square_skew
+    jacobian = np.eye(3) - b * skew + c * square_skew
+    return rotation, jacobian
+
+
+@njit(cache=True)
+def objective(q, gradient, transform, start, trend, points, table, scale, loss, tuning):
+    """Mean robust loss at parameters start + transform @ q; its gradient in q is written to `gradient`.
+
+    points (n, 3) in the start frame; start (8,); transform (8, m); q (m,).
+    """
+    p = start.copy()
+    for i in range(8):
+        for j in range(q.size):
+            p[i] += transform[i, j] * q[j]
+    rotation, jacobian = rotation_of(p[3:6])
+    height, width = p[6], p[7]
+    inverse_scale = 1.0 / scale
+    total = 0.0
+    g_x = g_y = g_z = c_x = c_y = c_z = g_h = g_w = 0.0
+    for i in range(points.shape[0]):
+        dx, dy, dz = points[i, 0] - p[0], points[i, 1] - p[1], points[i, 2] - p[2]
+        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
+        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
+        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
+        rho, psi, _ = loss_jet(r * inverse_scale, loss, tuning)
+        total += rho
+        a, b, c = psi * r_y, psi * r_z, psi * r_x
+        g_x += c
+        g_y += a
+        g_z += b
+        c_x += a * z - b * y
+        c_y += b * x - c * z
+        c_z += c * y - a * x
+        g_h += psi * r_h
+        g_w += psi * r_w
+    # The residual's gradient in the body frame is (r_x, r_y, r_z); a body rotation moves u by u x phi.
+    if gradient.size > 0:
+        full = np.empty(8)
+        for i in range(3):
+            full[i] = -(rotation[i, 0] * g_x + rotation[i, 1] * g_y + rotation[i, 2] * g_z)
+            full[3 + i] = jacobian[0, i] * c_x + jacobian[1, i] * c_y + jacobian[2, i] * c_z
+        full[6], full[7] = g_h, g_w
+        norm = 1.0 / (scale * points.shape[0])
+        for j in range(q.size):
+            s = 0.0
+            for i in range(8):
+                s += transform[i, j] * full[i]
+            gradient[j] = s * norm
+    return total / points.shape[0]
+
+
+@njit(cache=True)
+def normal_matrix(points, height, width, trend, table, scale, loss, tuning):
+    """Normal matrices of the residuals in units of the scale, at zero increments.
+
+    points (n, 3) in the template's frame. Returns the weighted matrix (8, 8), the unweighted one over the
+    inliers (8, 8), and [number of inliers, their sum of psi^2, their sum of psi'], an inlier being a point
+    whose residual lies within `tuning` scales.
+    """
+    weighted = np.zeros((8, 8))
+    plain = np.zeros((8, 8))
+    sums = np.zeros(3)
+    row = np.empty(8)
+    step = 1e-4
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
+        s = r / scale
+        _, psi, weight = loss_jet(s, loss, tuning)
+        inlier = 0.0
+        if abs(s) < tuning:
+            inlier = 1.0
+            sums[0] += 1.0
+            sums[1] += psi * psi
+            sums[2] += (loss_jet(s + step, loss, tuning)[1] - loss_jet(s - step, loss, tuning)[1]) / (2 * step)
+        row[0], row[1], row[2] = -r_x, -r_y, -r_z
+        row[3], row[4], row[5] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
+        row[6], row[7] = r_h, r_w
+        for j in range(8):
+            for k in range(j + 1):
+                product = row[j] * row[k]
+                weighted[j, k] += weight * product
+                plain[j, k] += inlier * product
+    for j in range(8):
+        for k in range(j + 1):
+            weighted[j, k] /= scale * scale
+            plain[j, k] /= scale * scale
+            weighted[k, j] = weighted[j, k]
+            plain[k, j] = plain[j, k]
+    return weighted, plain, sums
+
+
+@njit(cache=True)
+def residuals(points, height, width, trend, table):
+    """Residuals (n,) of points (n, 3) in the template's frame."""
+    out = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
+        out[i] = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0]
+    return out
+
+
+@njit(cache=True)
+def losses(x, loss, tuning):
+    """Loss (n,) of residuals x (n,) in units of their scale."""
+    out = np.empty(x.size)
+    for i in range(x.size):
+        out[i] = loss_jet(x[i], loss, tuning)[0]
+    return out
+
+
+@njit(cache=True)
+def median_absolute(x):
+    """Median of |x|."""
+    return np.median(np.abs(x))
+
+
+@njit(cache=True)
+def select(points, shift, rotation, low_x, high_x, half_y, half_z):
+    """Points (n, 3) of a frame brought to the frame (shift, rotation columns), those in the box kept."""
+    out = np.empty_like(points)
+    m = 0
+    for i in range(points.shape[0]):
+        dx, dy, dz = points[i, 0] - shift[0], points[i, 1] - shift[1], points[i, 2] - shift[2]
+        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
+        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
+        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+        if low_x <= x <= high_x and abs(y) <= half_y and abs(z) <= half_z:
+            out[m, 0], out[m, 1], out[m, 2] = x, y, z
+            m += 1
+    return out[:m]
+
+
+@njit(cache=True)
+def plane_loss(points, scale, loss, tuning, iterations):
+    """Smallest robust loss of a plane z = a + b x + c y found by reweighting; points (n, 3)."""
+    abc = np.zeros(3)
+    best = np.inf
+    for _ in range(iterations):
+        m = np.zeros((3, 3))
+        v = np.zeros(3)
+        total = 0.0
+        for i in range(points.shape[0]):
+            x, y, z = points[i, 0], points[i, 1], points[i, 2]
+            r = z - abc[0] - abc[1] * x - abc[2] * y
+            rho, _, weight = loss_jet(r / scale, loss, tuning)
+            total += rho
+            m[0, 0] += weight
+            m[0, 1] += weight * x
+            m[0, 2] += weight * y
+            m[1, 1] += weight * x * x
+            m[1, 2] += weight * x * y
+            m[2, 2] += weight * y * y
+            v[0] += weight * r
+            v[1] += weight * r * x
+            v[2] += weight * r * y
+        best = min(best, total)
+        m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
+        det = (
+            m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
+            - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
+            + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
+        )
+        if not abs(det) > 1e-12 * m[0, 0] * m[1, 1] * m[2, 2]:
+            break
+        abc += np.linalg.solve(m, v)
+    return best

@@ -1,0 +1,99 @@
+"""The cross-section of a ridge: height over the base as a function of y / width, 1 at the apex, 0 at both feet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# Uniform cubic B-spline on one span, as coefficients of 1, x, x^2, x^3; one row for each of the four poles.
+_UNIFORM_CUBIC = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """A cubic B-spline section on uniform knots from foot to foot.
+
+    coefficients: (m,) heights of the raised control points; m + 3 equal spans make the width, so value, slope
+    and curvature are zero at both feet. They are scaled so that the apex is 1.
+    """
+
+    coefficients: Array
+    name: str = "custom"
+    table: Array = field(init=False, repr=False)
+    """(m + 3, 4) coefficients of 1, x, x^2, x^3 in each span, x in [0, 1)."""
+
+    def __post_init__(self) -> None:
+        raised = np.array(self.coefficients, dtype=np.float64)
+        if raised.ndim != 1 or raised.size == 0 or not np.isfinite(raised).all() or raised.max() <= 0:
+            raise ValueError(
+                f"section coefficients: expected one or more finite numbers, one of them positive, "
+                f"got {self.coefficients!r}"
+            )
+        apex = _table(raised)
+        raised = raised / _largest(apex)
+        raised.setflags(write=False)
+        table = _table(raised)
+        table.setflags(write=False)
+        object.__setattr__(self, "coefficients", raised)
+        object.__setattr__(self, "table", table)
+
+    def __call__(self, eta: ArrayLike, derivative: int = 0) -> Array:
+        """Height at eta = y / width, or its derivative with respect to eta; 0 beyond the feet. Any shape."""
+        eta = np.asarray(eta, dtype=np.float64)
+        spans = len(self.table)
+        position = (eta + 0.5) * spans
+        span = np.clip(np.floor(position), 0, spans - 1).astype(np.intp)
+        x = position - span
+        rows = self.table[span]
+        for _ in range(derivative):
+            rows = rows[..., 1:] * np.arange(1, rows.shape[-1])
+        value = sum(rows[..., k] * x**k for k in range(rows.shape[-1])) * float(spans) ** derivative
+        return np.where((position >= 0) & (position < spans), value, 0.0)
+
+    @property
+    def half_height_width(self) -> float:
+        """Full width at half height as a part of the width between the feet."""
+        eta = np.linspace(-0.5, 0.5, 20001)
+        above = eta[self(eta) >= 0.5]
+        return float(self._crossing(above[-1]) - self._crossing(above[0]))
+
+    def _crossing(self, eta: float) -> float:
+        for _ in range(5):
+            eta -= float((self(eta) - 0.5) / self(eta, 1))
+        return eta
+
+
+def _table(raised: Array) -> Array:
+    padded = np.concatenate([np.zeros(3), raised, np.zeros(3)])
+    return np.array([padded[i : i + 4] @ _UNIFORM_CUBIC for i in range(raised.size + 3)])
+
+
+def _largest(table: Array) -> float:
+    x = np.linspace(0.0, 1.0, 65)
+    values = table @ np.vander(x, 4, increasing=True).T
+    span, k = np.unravel_index(np.argmax(values), values.shape)
+    a, b, c, d = table[span]
+    t = x[k]
+    for _ in range(8):
+        second = 2 * c + 6 * d * t
+        if second >= 0:
+            break
+        t = min(max(t - (b + t * (2 * c + t * 3 * d)) / second, 0.0), 1.0)
+    return float(a + t * (b + t * (c + t * d)))
+
+
+@lru_cache(maxsize=1)
+def bell() -> Section:
+    """One raised control point on four spans: the cubic B-spline basis function."""
+    return Section(np.array([1.0]), "bell")
+
+
+@lru_cache(maxsize=1)
+def plateau() -> Section:
+    """Three control points raised alike on six spans: the apex is at their height, half height at half width."""
+    return Section(np.ones(3), "plateau")

@@ -1,0 +1,37 @@
+"""All tunables of the registration, in one place. The command line derives its options from these fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+
+def _setting(default: float | int | str | bool, text: str) -> object:
+    return field(default=default, metadata={"help": text})
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Tunables; lengths are parts of the local width unless said otherwise."""
+
+    measure: str = _setting("residual", "what a template minimises: residual, or M for the paper's mean distance")  # type: ignore[assignment]
+    k: int = _setting(2, "nearest points averaged in M")  # type: ignore[assignment]
+    optimiser: str = _setting("auto", "name of an NLopt algorithm; auto: LD_SLSQP for residual, LN_BOBYQA for M")  # type: ignore[assignment]
+    loss: str = _setting("tukey", "robust loss of the final fit: tukey, huber, cauchy, square")  # type: ignore[assignment]
+    tuning: float = _setting(5.0, "tuning constant of the loss, in units of the noise scale")  # type: ignore[assignment]
+    section: str = _setting("auto", "cross-section: auto, bell, plateau")  # type: ignore[assignment]
+    length: float = _setting(0.8, "length of a template")  # type: ignore[assignment]
+    flank: float = _setting(0.3, "breadth of each flat flank")  # type: ignore[assignment]
+    max_evaluations: int = _setting(80, "evaluations allowed for one optimisation")  # type: ignore[assignment]
+    tolerance: float = _setting(1e-7, "step that ends an optimisation, in units of one noise scale")  # type: ignore[assignment]
+    march_width_change: float = _setting(1.5, "largest factor by which the width may change from template to template")  # type: ignore[assignment]
+    march_height_change: float = _setting(2.0, "largest factor by which the height may rise from template to template")  # type: ignore[assignment]
+    width_change: float = _setting(2.0, "largest factor by which one fit may change the width")  # type: ignore[assignment]
+    height_change: float = _setting(4.0, "largest factor by which one fit may raise the height")  # type: ignore[assignment]
+    evidence: float = _setting(20.0, "log likelihood ratio, doubled, above which a window holds a ridge")  # type: ignore[assignment]
+    look_ahead: int = _setting(2, "templates looked ahead over a weak passage")  # type: ignore[assignment]
+    max_templates: int = _setting(500, "templates in all")  # type: ignore[assignment]
+
+    @classmethod
+    def names(cls) -> list[str]:
+        """Names of all settings."""
+        return [f.name for f in fields(cls)]

@@ -1,0 +1,118 @@
+"""After the march: place both ends, then refit every template knowing its neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.improve import FEWEST_POINTS, loss_of, refine
+from ridgefeature.kernels import residual as kernel
+from ridgefeature.march import Track, reverse, turn_between
+from ridgefeature.section import Section
+from ridgefeature.settings import Settings
+from ridgefeature.template import Template
+from ridgefeature.window import Window
+
+Array = NDArray[np.float64]
+
+
+def trends(templates: list[Template]) -> list[Template]:
+    """Each template with the path's curvature and the slopes of height and width that its neighbours show."""
+    out = []
+    for i, template in enumerate(templates):
+        first, second = templates[max(i - 1, 0)], templates[min(i + 1, len(templates) - 1)]
+        step = float(np.linalg.norm(template.position - first.position) + np.linalg.norm(second.position - template.position))
+        if step == 0:
+            out.append(replace(template, trend=np.zeros(3)))
+            continue
+        turn = turn_between(first, second)
+        # The turn about the normal, seen from the template's own frame.
+        about = float(template.rotation[:, 2] @ (first.rotation @ turn))
+        limit = 0.9 / template.half_breadth
+        trend = np.array([np.clip(about / step, -limit, limit), (second.height - first.height) / step,
+                          (second.width - first.width) / step])
+        out.append(replace(template, trend=trend))
+    return out
+
+
+def _change_point(window: Window, template: Template, reach: float, settings: Settings) -> float | None:
+    """Where along x, from the template's middle to `reach`, the ridge stops explaining more than its base does.
+
+    The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of x
+    (the maximum-likelihood change point). None if there are too few points.
+    """
+    points = window(template, 0.0, 2 * reach / template.length)
+    if len(points) < FEWEST_POINTS:
+        return None
+    trend, table = template.trend.copy(), template.section.table
+    # Far ahead the slopes are extrapolation: neither height nor width may more than halve.
+    trend[1] = np.clip(trend[1], -0.5 * abs(template.height) / reach, 0.5 * abs(template.height) / reach)
+    trend[2] = np.clip(trend[2], -0.5 * template.width / reach, 0.5 * template.width / reach)
+    ridge = kernel.residuals(points, template.height, template.width, trend, table)
+    base = kernel.residuals(points, 0.0, template.width, trend, table)
+    # Errors of the extrapolation must not count as noise.
+    scale = max(template.scale, 0.1 * abs(template.height))
+    gain = kernel.losses(base / scale, *loss_of(settings)) - kernel.losses(ridge / scale, *loss_of(settings))
+    order = np.argsort(points[:, 0], kind="stable")
+    total = np.concatenate([[0.0], np.cumsum(gain[order])])
+    k = int(np.argmax(total))
+    if k == 0:
+        return 0.0
+    x = points[order, 0]
+    last = x[k - 1]
+    return float(0.5 * (last + x[k])) if k < len(x) else float(last)
+
+
+def _trim_end(window: Window, templates: list[Template], settings: Settings) -> list[Template]:
+    """Templates whose last one ends where the ridge does: shortened, lengthened or dropped."""
+    templates = trends(templates)
+    if len(templates) < 2:
+        only = templates[-1]
+        end = _change_point(window, only, 1.0 * only.length, settings)
+        return templates if end is None else [_relength(only, -0.5 * only.length, max(end, 0.1 * only.length))]
+    while len(templates) >= 2:
+        inner, last = templates[-2], templates[-1]
+        gap = float(np.linalg.norm(last.position - inner.position))
+        end = _change_point(window, inner, gap + 1.5 * last.length, settings)
+        if end is None:
+            return templates
+        start = gap - 0.5 * last.length
+        rest = end - start
+        if rest < 0.45 * last.length:
+            if len(templates) == 2 or end > 0.3 * inner.length:
+                return [*templates[:-2], _relength(inner, -0.5 * inner.length, max(end, 0.3 * inner.length))]
+            templates = templates[:-1]
+            continue
+        return [*templates[:-1], _relength(last, -0.5 * last.length, min(rest - 0.5 * last.length, last.length))]
+    return templates
+
+
+def _relength(template: Template, low: float, high: float) -> Template:
+    """The patch from x = low to x = high of the template's own frame, on its bent path."""
+    middle = 0.5 * (low + high)
+    bend = template.trend[0]
+    turn, _ = kernel.rotation_of(np.array([0.0, 0.0, bend * middle]))
+    shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
+    return replace(
+        template, position=template.position + template.rotation @ shift, rotation=template.rotation @ turn,
+        length=high - low, height=template.height + template.trend[1] * middle,
+        width=max(template.width + template.trend[2] * middle, 0.5 * template.width),
+    )
+
+
+def place_ends(window: Window, track: Track, settings: Settings) -> Track:
+    """The track with both end templates cut to where the ridge ends."""
+    templates = _trim_end(window, list(track.templates), settings)
+    templates = [reverse(t) for t in _trim_end(window, [reverse(t) for t in reversed(templates)], settings)]
+    return Track(tuple(reversed(templates)), track.stop)
+
+
+def settle(window: Window, track: Track, section: Section, settings: Settings) -> Track:
+    """Refit every template with the trend of its neighbours and the given section."""
+    known = trends([replace(t, section=section) for t in track.templates])
+    fitted = [refine(window, t, settings) for t in known]
+    kept = [new if new.std is not None and new.status != "failed" else old
+            for new, old in zip(fitted, known, strict=True)]
+    return Track(tuple(kept), track.stop)

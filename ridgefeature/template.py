@@ -1,0 +1,63 @@
+"""A straight ridge patch T(p) with 8 degrees of freedom, as a cubic B-spline patch with flat flanks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.section import Section, bell
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """One straight ridge patch, and what its fit said.
+
+    Frame of the scan. `position` (3,) is the centre of the patch on the base, under the apex; the columns of
+    `rotation` (3, 3) are its axes: along the ridge, across, and up. `width` is the distance between the two
+    feet, where the section meets the base with zero slope; `height` is the apex over the base. The full width
+    at half height is width * section.half_height_width. `flank` is the breadth of the flat strip outside each
+    foot and `length` the extent along the ridge.
+    """
+
+    position: Array
+    rotation: Array
+    width: float
+    height: float
+    length: float
+    flank: float
+    section: Section
+    trend: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) curvature of the path, slopes of height and width along it: known from the neighbours, not fitted."""
+    std: Array | None = None
+    """(8,) one standard deviation: translation (along is fixed: 0), rotation in the own frame, height, width."""
+    scale: float = 0.0
+    """Robust standard deviation of the residuals."""
+    evidence: float = 0.0
+    """Twice the log likelihood ratio of ridge against no ridge."""
+    points: int = 0
+    inliers: int = 0
+    evaluations: int = 0
+    status: str = "start"
+    M: float = np.nan
+    """Mean directed distance from the patch to the scan (Eq. 3)."""
+    M_floor: float = np.nan
+    """What M would be for a perfect patch, from the density of the points alone."""
+
+    @property
+    def start(self) -> Array:
+        """(3,) middle of the first row."""
+        return self.position - 0.5 * self.length * self.rotation[:, 0]
+
+    @property
+    def end(self) -> Array:
+        """(3,) middle of the last row."""
+        return self.position + 0.5 * self.length * self.rotation[:, 0]
+
+    @property
+    def half_breadth(self) -> float:
+        """Distance from the spine to the outer border of a flank."""
+        return 0.5 * self.width + self.flank

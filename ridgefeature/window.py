@@ -1,0 +1,84 @@
+"""What a fit sees of the scan: the points of one template's window, thinned where they are very dense."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.grid import Grid, nearest_distances, points_in_ball, points_in_box, typical_spacing
+from ridgefeature.kernels.residual import select
+from ridgefeature.template import Template
+
+Array = NDArray[np.float64]
+
+MOST_POINTS = 3000
+"""Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
+_MARGIN = 1.25
+
+
+@dataclass(eq=False)
+class Window:
+    """Points around a template, from the grid index; neighbouring requests share one look-up."""
+
+    grid: Grid
+    spacing: float = field(init=False)
+    _frame: tuple[Array, Array, Array] | None = field(default=None, init=False)
+    _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
+
+    def __post_init__(self) -> None:
+        self.spacing = typical_spacing(self.grid)
+
+    def __call__(self, template: Template, before: float = 1.0, after: float = 1.0) -> Array:
+        """Points (m, 3) in the template's frame.
+
+        The window covers the patch, flanks included, up to twice the height and a quarter of the width above
+        and below the base. `before` and `after` stretch its halves along the ridge.
+        """
+        half_y = template.half_breadth
+        half_z = 2.0 * abs(template.height) + 0.25 * template.width
+        low, high = -0.5 * template.length * before, 0.5 * template.length * after
+        middle = np.array([0.5 * (low + high), 0.0, 0.0])
+        half = np.array([0.5 * (high - low), half_y, half_z])
+        centre = template.position + template.rotation @ middle
+        if not self._covers(centre, template.rotation, half):
+            self._look_up(centre, template.rotation, _MARGIN * half)
+        position, rotation, _ = self._frame  # type: ignore[misc]
+        turn = rotation.T @ template.rotation
+        shift = rotation.T @ (template.position - position)
+        return select(self._points, shift, turn, low, high, half_y, half_z)
+
+    def _covers(self, centre: Array, rotation: Array, half: Array) -> bool:
+        if self._frame is None:
+            return False
+        position, old, reach = self._frame
+        if not 0.3 * reach[1] < half[1]:
+            return False
+        return bool((np.abs(old.T @ (centre - position)) + np.abs(old.T @ rotation) @ half <= reach).all())
+
+    def _look_up(self, centre: Array, rotation: Array, half: Array) -> None:
+        expected = 4 * half[0] * half[1] * (0.5 / max(self.spacing, 1e-300)) ** 2
+        cells = None
+        if expected > MOST_POINTS:
+            ratio = half[0] / half[1]
+            cells = (max(round(np.sqrt(0.5 * MOST_POINTS * ratio)), 1), max(round(np.sqrt(0.5 * MOST_POINTS / ratio)), 1))
+        self._points = points_in_box(self.grid, centre, rotation.T, half, cells)
+        self._frame = (centre, rotation, half)
+
+    def around(self, centre: Array, radius: float, frame: Array, most: int = 400) -> Array:
+        """Points (m, 3) relative to centre within the radius, about `most` of them, spread evenly.
+
+        frame (3, 3): columns are two tangents and the normal; thinning is by bins along the tangents.
+        """
+        if np.pi * radius**2 * (0.5 / max(self.spacing, 1e-300)) ** 2 < 2 * most:
+            points = points_in_ball(self.grid, centre, radius) - centre
+            return points
+        bins = max(int(np.sqrt(most * 4 / np.pi)), 2)
+        local = points_in_box(self.grid, centre, frame.T, np.full(3, radius), (bins, bins))
+        local = local[(local * local).sum(axis=1) <= radius * radius]
+        return local @ frame.T
+
+    def mean_distance(self, points: Array, k: int) -> float:
+        """Mean distance of points (m, 3) to their k nearest scan points (Eq. 3)."""
+        return float(nearest_distances(self.grid, points, k).mean())
