@@ -17,6 +17,7 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 Progress = Callable[[Template], None]
 
+INTERRUPTED = "interrupted"
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -102,45 +103,59 @@ def _meets(template: Template, others: list[Template]) -> bool:
     return False
 
 
-def march_one_way(window: Window, first: Template, behind: list[Template], settings: Settings,
-                  progress: Progress | None = None) -> tuple[list[Template], str]:
-    """Templates that follow `first`, not including it, and why the march stopped.
+def _fit_next(rough: Window, full: Window, start: Template, settings: Settings) -> tuple[Template, str]:
+    """The next template and why it is none; a rejected one is tried again with all points of its window."""
+    fitted = improve(rough, start, settings)
+    why = _reject(fitted, start, settings)
+    if why and fitted.points >= FEWEST_POINTS:
+        again = improve(full, start, settings)
+        why_again = _reject(again, start, settings)
+        if not why_again:
+            return again, ""
+    return fitted, why
 
-    `behind` are templates found on the other side of the first, the nearest first.
+
+def march_one_way(rough: Window, full: Window, chain: list[Template], found: list[Template], settings: Settings,
+                  progress: Progress | None = None) -> str:
+    """Append the templates that follow `chain` to `found`, and tell why the march stopped.
+
+    chain: what is known so far, in the direction of the march; not changed.
     """
-    found: list[Template] = []
-    pending = 0
-    chain = [*reversed([reverse(t) for t in behind]), first]
-    reason = ""
     last, before = chain[-1], chain[-2] if len(chain) > 1 else None
-    while True:
-        if len(chain) + pending >= settings.max_templates:
-            return found, f"max_templates ({settings.max_templates}) reached"
+    reason, pending = "", 0
+    while len(chain) + len(found) < settings.max_templates:
         start = append(last, before, settings)
-        fitted = improve(window, start, settings)
-        why = _reject(fitted, start, settings)
-        if not why:
-            if _meets(fitted, chain[:-2]):
-                return found, "met itself"
-            pending = 0
-            reason = ""
-            found.append(fitted)
-            chain.append(fitted)
-            last, before = fitted, last
-            if progress is not None:
-                progress(fitted)
+        fitted, why = _fit_next(rough, full, start, settings)
+        if why:
+            reason, pending = reason or why, pending + 1
+            if pending > settings.look_ahead:
+                return reason
+            before, last = None, start
             continue
-        reason = reason or why
-        pending += 1
-        if pending > settings.look_ahead:
-            return found, reason
-        before, last = None, start
+        if _meets(fitted, [*chain, *found][:-2]):
+            return "it ran back into itself"
+        reason, pending = "", 0
+        found.append(fitted)
+        last, before = fitted, last
+        if progress is not None:
+            progress(fitted)
+    return f"max_templates ({settings.max_templates}) reached"
 
 
-def march(window: Window, first: Template, settings: Settings, progress: Progress | None = None) -> Track:
-    """March both ways from the first template."""
-    settings = replace(settings, width_change=settings.march_width_change, height_change=settings.march_height_change)
-    ahead, why_ahead = march_one_way(window, first, [], settings, progress)
-    back, why_back = march_one_way(window, reverse(first), ahead, settings, progress)
-    templates = [*(reverse(t) for t in reversed(back)), first, *ahead]
-    return Track(tuple(templates), (why_back, why_ahead))
+def march(rough: Window, full: Window, first: Template, settings: Settings, progress: Progress | None = None) -> Track:
+    """March both ways from the first template; an interrupt ends it and keeps what is there."""
+    settings = replace(
+        settings, width_change=settings.march_width_change, height_change=settings.march_height_change
+    )
+    ahead: list[Template] = []
+    back: list[Template] = []
+    why_ahead = why_back = INTERRUPTED
+    try:
+        if progress is not None:
+            progress(first)
+        why_ahead = march_one_way(rough, full, [first], ahead, settings, progress)
+        known = [reverse(t) for t in [*reversed(ahead), first]]
+        why_back = march_one_way(rough, full, known, back, settings, progress)
+    except KeyboardInterrupt:
+        pass
+    return Track((*(reverse(t) for t in reversed(back)), first, *ahead), (why_back, why_ahead))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import FEWEST_POINTS, loss_of, refine
+from ridgefeature.improve import FEWEST_POINTS, judge, loss_of, refine
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.march import Track, reverse, turn_between
 from ridgefeature.section import Section
@@ -112,7 +112,14 @@ def place_ends(window: Window, track: Track, settings: Settings) -> Track:
 def settle(window: Window, track: Track, section: Section, settings: Settings) -> Track:
     """Refit every template with the trend of its neighbours and the given section."""
     known = trends([replace(t, section=section) for t in track.templates])
+    settings = replace(
+        settings, width_change=settings.march_width_change, height_change=settings.march_height_change
+    )
     fitted = [refine(window, t, settings) for t in known]
-    kept = [new if new.std is not None and new.status != "failed" else old
-            for new, old in zip(fitted, known, strict=True)]
-    return Track(tuple(kept), track.stop)
+    kept = [old if new.status in ("failed", "no data") else new for new, old in zip(fitted, known, strict=True)]
+    return Track(tuple(judge(window, t, settings) for t in kept), track.stop)
+
+
+def choose_section(window: Window, track: Track, settings: Settings) -> Section:
+    """The section that the ridge's points agree with best."""
+    return track.templates[0].section

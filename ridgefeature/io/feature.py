@@ -1,0 +1,156 @@
+"""The feature file: a ridge as versioned JSON, every number exact to the last bit."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ridgefeature.section import Section
+from ridgefeature.settings import Settings
+from ridgefeature.stations import Stations
+from ridgefeature.template import Template
+
+if TYPE_CHECKING:
+    from ridgefeature.ridge import Ridge
+
+FORMAT = "ridgefeature.ridge"
+VERSION = 1
+SUFFIX = ".ridge.json"
+
+
+def to_document(ridge: Ridge) -> dict[str, Any]:
+    """The ridge as plain lists, numbers and words."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "unit": ridge.unit,
+        "source": None if ridge.source is None else asdict(ridge.source),
+        "pick": ridge.pick.tolist(),
+        "settings": asdict(ridge.settings),
+        "closed": ridge.closed,
+        "stop": list(ridge.stop),
+        "section": {"name": ridge.section.name, "coefficients": ridge.section.coefficients.tolist()},
+        "stations": {f.name: _plain(getattr(ridge, f.name)) for f in fields(Stations)},
+        "templates": [
+            {f.name: _plain(getattr(t, f.name)) for f in fields(Template) if f.name != "section"}
+            for t in ridge.templates
+        ],
+    }
+
+
+def from_document(document: Any) -> Ridge:
+    """The ridge of a document made by `to_document`. Raises ValueError for anything else."""
+    from ridgefeature.ridge import Ridge
+    from ridgefeature.scan import Source
+
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise ValueError(f"expected a ridge feature (format {FORMAT!r}); this is something else")
+    if document.get("version") != VERSION:
+        raise ValueError(
+            f"expected version {VERSION} of the feature format, got {document.get('version')!r}; "
+            "read it with the release that wrote it, or update ridgefeature"
+        )
+    try:
+        section = Section(np.array(document["section"]["coefficients"], dtype=np.float64), document["section"]["name"])
+        stations = {f.name: _array(document["stations"][f.name]) for f in fields(Stations)}
+        ridge = Ridge(
+            **stations,
+            section=section,
+            templates=tuple(_template(t, section) for t in document["templates"]),
+            stop=(str(document["stop"][0]), str(document["stop"][1])),
+            closed=bool(document["closed"]),
+            unit=str(document["unit"]),
+            pick=_array(document["pick"]),
+            settings=Settings(**document["settings"]),
+            source=None if document["source"] is None else Source(**document["source"]),
+        )
+    except (KeyError, TypeError, IndexError, AttributeError) as error:
+        raise ValueError(f"expected a whole ridge feature, got one with {error!r} missing or wrong; save it again") from error
+    _check_shapes(ridge)
+    return ridge
+
+
+def write_feature(ridge: Ridge, path: str | os.PathLike[str]) -> Path:
+    """Write the ridge beside `path`, then rename it. Raises OSError if the folder cannot be written."""
+    path = Path(path)
+    text = json.dumps(to_document(ridge), indent=1)
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    try:
+        with os.fdopen(descriptor, "w", encoding="ascii") as file:
+            file.write(text)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return path
+
+
+def load(path: str | os.PathLike[str]) -> Ridge:
+    """Read a ridge feature that `Ridge.save` wrote; equal to it to the last bit.
+
+    Raises OSError if the file cannot be read, ValueError if it is no feature file, cut short or of another version.
+    """
+    path = Path(path)
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: expected a ridge feature as JSON, got a file that is damaged or cut short ({error})") from error
+    try:
+        return from_document(document)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _plain(value: Any) -> Any:
+    """Lists for arrays; None for what JSON has no word for, in numbers that were never fitted."""
+    if isinstance(value, np.ndarray):
+        return [_plain(x) for x in value.tolist()] if value.dtype == np.float64 else value.tolist()
+    if isinstance(value, list):
+        return [_plain(x) for x in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return {"float": repr(value)}
+    return value
+
+
+def _array(value: Any) -> np.ndarray[Any, Any]:
+    array = np.array(_number(value), dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def _number(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_number(x) for x in value]
+    return float(value["float"]) if isinstance(value, dict) else value
+
+
+def _template(document: dict[str, Any], section: Section) -> Template:
+    values = {f.name: document[f.name] for f in fields(Template) if f.name != "section"}
+    for name in ("position", "rotation", "trend"):
+        values[name] = _array(values[name])
+    values["std"] = None if values["std"] is None else _array(values["std"])
+    return Template(section=section, **{k: _number(v) if k != "status" else v for k, v in values.items()
+                                        if k not in ("position", "rotation", "trend", "std")},
+                    **{k: values[k] for k in ("position", "rotation", "trend", "std")})
+
+
+def _check_shapes(ridge: Ridge) -> None:
+    k = ridge.arc_length.shape
+    for f in fields(Stations):
+        want = (*k, 3) if f.name in ("spine", "tangent", "normal") else k
+        array = getattr(ridge, f.name)
+        if array.ndim == 0 or array.shape != want or len(array) < 5 or not (np.isfinite(array).all() or f.name.endswith("_std")):
+            raise ValueError(f"expected {f.name} of shape {want} and finite, got shape {array.shape}; save the feature again")

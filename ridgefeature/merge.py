@@ -1,0 +1,87 @@
+"""CONSTRUCT: rows of control points across the ridge, merged into one C2 bicubic surface."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.basis import basis_matrix, greville
+from ridgefeature.bspline import Surface
+from ridgefeature.section import Section
+from ridgefeature.template import Template
+
+Array = NDArray[np.float64]
+
+DEGREE = 3
+_OUTSIDE = 0.1
+"""Breadth of the flank's knot span, in widths."""
+LEAST_BORDER = 0.5 + 2 * _OUTSIDE / 3
+"""The border must lie further out than this many widths, or the flank's control points would cross."""
+
+
+def section_knots(section: Section) -> Array:
+    """Knots across, in widths: simple at feet and between, the end of the flanks repeated."""
+    end = np.full(DEGREE + 1, 0.5 + _OUTSIDE)
+    return np.concatenate([-end, np.linspace(-0.5, 0.5, len(section.table) + 1), end])
+
+
+def section_poles(section: Section) -> tuple[Array, Array]:
+    """Control points of one row, (n,) positions across in widths and (n,) heights in apex heights.
+
+    The outermost are the flanks' borders, which follow no width; their position here is not used.
+    """
+    knots = section_knots(section)
+    across = greville(knots, DEGREE)
+    raised = np.zeros(len(across))
+    raised[DEGREE + 1 : DEGREE + 1 + len(section.coefficients)] = section.coefficients
+    return across, raised
+
+
+@lru_cache(maxsize=16)
+def _interpolation(k: int) -> tuple[Array, Array]:
+    """Not-a-knot cubic knots on [0, 1] for k even sites, and the inverse of the interpolation matrix."""
+    sites = np.linspace(0.0, 1.0, k)
+    knots = np.concatenate([np.zeros(4), sites[2:-2], np.ones(4)])
+    inverse = np.linalg.inv(basis_matrix(knots, DEGREE, sites))
+    knots.setflags(write=False)
+    inverse.setflags(write=False)
+    return knots, inverse
+
+
+def along(arc_length: Array, values: Array, at: Array, derivative: int = 0) -> Array:
+    """The C2 spline through values (k, ...) at even arc lengths (k,), or its derivative, at `at` (m,)."""
+    knots, inverse = _interpolation(len(arc_length))
+    total = arc_length[-1]
+    basis = basis_matrix(knots * total, DEGREE, np.clip(at, 0.0, total), derivative)
+    return np.tensordot(basis @ inverse, values, 1)
+
+
+def merged_surface(arc_length: Array, spine: Array, across: Array, normal: Array, height: Array, width: Array,
+                   border: Array, section: Section) -> Surface:
+    """The surface through one row of control points at each of k even stations.
+
+    spine, across, normal (k, 3): origin and unit axes of each row; height, width, border (k,). The poles are affine
+    in height and in width, so what does not change with them is not worked out again. u is arc length, v the
+    distance from the spine in widths (on the ridge; on the flanks it runs on to the border).
+    """
+    eta, raised = section_poles(section)
+    knots, inverse = _interpolation(len(arc_length))
+    sideways = width[:, None] * eta
+    sideways[:, 0], sideways[:, -1] = -border, border
+    rows = spine[:, None] + sideways[..., None] * across[:, None] + (height[:, None] * raised)[..., None] * normal[:, None]
+    poles = np.tensordot(inverse, rows, 1)
+    return Surface(poles, knots * arc_length[-1], section_knots(section), DEGREE, DEGREE)
+
+
+def template_surface(template: Template) -> Surface:
+    """A straight template as the B-spline patch that it is: the same rows, four of them."""
+    t = template.rotation[:, 0]
+    s = np.linspace(0.0, template.length, 4)
+    same = np.ones(4)
+    return merged_surface(
+        s, template.start + s[:, None] * t, np.tile(template.rotation[:, 1], (4, 1)),
+        np.tile(template.rotation[:, 2], (4, 1)), template.height * same, template.width * same,
+        max(template.half_breadth, 1.01 * LEAST_BORDER * template.width) * same, template.section,
+    )

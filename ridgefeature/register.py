@@ -1,0 +1,181 @@
+"""Registration from one picked point to a finished ridge: GUESS, march, ends, settling, CONSTRUCT."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ridgefeature.distance import sampling_floor
+from ridgefeature.grid import Grid, build_grid, nearest_distance, nearest_distances, typical_spacing
+from ridgefeature.guess import Hints, guess
+from ridgefeature.march import Progress, Track, march, reverse
+from ridgefeature.merge import template_surface
+from ridgefeature.ridge import Ridge
+from ridgefeature.scan import Scan, as_scan
+from ridgefeature.section import bell
+from ridgefeature.settings import Settings
+from ridgefeature.settle import choose_section, place_ends, settle
+from ridgefeature.stations import lay_out
+from ridgefeature.template import Template
+from ridgefeature.window import Window
+
+Array = NDArray[np.float64]
+KINDS = ("ridge", "groove", "auto")
+_ROUGH_POINTS = 400
+
+
+class NoRidgeError(ValueError):
+    """There is no ridge at the picked point."""
+
+
+def register(
+    scan: Scan | ArrayLike,
+    at: ArrayLike,
+    *,
+    direction: ArrayLike | None = None,
+    width: float | None = None,
+    height: float | None = None,
+    kind: str = "ridge",
+    roi: float | None = None,
+    max_templates: int | None = None,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+) -> Ridge:
+    """Register the ridge under one picked point.
+
+    scan: a Scan or an (n, 3) array of unordered points. at (3,): the pick, on or near the ridge, in the scan's
+    frame. Starting guesses, all optional: direction (3,) along the ridge, in which arc length then ascends; width
+    between the feet; height of the apex. kind: "ridge", "groove" (negative height) or "auto". roi: radius about
+    the pick beyond which points are not looked at. progress: called with every template the march adds.
+    The same points in any order give the same ridge, bit for bit.
+    Raises NoRidgeError where the data agree with a flat base, ValueError for bad input. An interrupt (Ctrl-C) ends
+    the march and keeps what is there.
+    """
+    scan = as_scan(scan)
+    pick = _vector(at, "at")
+    hints = _hints(direction, width, height, kind)
+    settings = settings or Settings()
+    if max_templates is not None:
+        settings = replace(settings, max_templates=_positive(max_templates, "max_templates", whole=True))
+    if roi is not None:
+        scan = scan.crop(pick, _positive(roi, "roi"))
+    grid = build_grid(scan.points)
+    spacing = typical_spacing(grid)
+    extent = spacing / 0.47 * np.sqrt(len(scan.points))
+    _check_pick(grid, pick, spacing, extent)
+    rough, full = Window(grid, spacing, _ROUGH_POINTS), Window(grid, spacing)
+    track = _track(rough, full, pick, extent, hints, settings, progress)
+    track = _directed(track, pick, hints)
+    templates = _with_distances(track.templates, grid)
+    stations = lay_out(templates, settings)
+    return Ridge(
+        **vars(stations), section=templates[0].section, templates=templates, stop=track.stop, unit=scan.unit,
+        pick=pick, settings=settings, source=scan.source,
+    )
+
+
+def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints, settings: Settings,
+           progress: Progress | None) -> Track:
+    first = guess(rough, pick, extent, hints, bell(), settings)
+    if first is None or first.evidence < settings.evidence:
+        found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
+        raise NoRidgeError(
+            f"no ridge at {_text(pick)}: the points around it agree with a flat base (evidence {found}, needed "
+            f"{settings.evidence:g}); pick a point on the ridge, or give direction=, width= and height= as a start"
+        )
+    track = march(rough, full, first, settings, progress)
+    track = place_ends(full, track, settings)
+    track = settle(full, track, bell(), settings)
+    section = choose_section(full, track, settings)
+    return track if section is track.templates[0].section else settle(full, track, section, settings)
+
+
+def _directed(track: Track, pick: Array, hints: Hints) -> Track:
+    """The track in the hinted direction, else starting at the end nearer to the pick."""
+    first, last = track.templates[0], track.templates[-1]
+    nearest = min(track.templates, key=lambda t: float(np.linalg.norm(t.position - pick)))
+    if hints.direction is not None:
+        backwards = nearest.rotation[:, 0] @ hints.direction < 0
+    else:
+        backwards = np.linalg.norm(last.end - pick) < np.linalg.norm(first.start - pick)
+    if not backwards:
+        return track
+    return Track(tuple(reverse(t) for t in reversed(track.templates)), (track.stop[1], track.stop[0]))
+
+
+def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Template, ...]:
+    """The templates with M, their mean distance to the scan, and what it would be for a perfect patch."""
+    along, across = (np.arange(8) + 0.5) / 8, (np.arange(16) + 0.5) / 8 - 1
+    samples, areas = [], []
+    for t in templates:
+        y = across * t.half_breadth
+        z = t.height * t.section(y / t.width)
+        local = np.empty((8, 16, 3))
+        local[..., 0] = ((along - 0.5) * t.length)[:, None]
+        local[..., 1] = y + 0.5 * t.trend[0] * local[..., 0] ** 2
+        local[..., 2] = z
+        samples.append(t.position + local.reshape(-1, 3) @ t.rotation.T)
+        areas.append(2 * t.half_breadth * t.length)
+    distances = nearest_distances(grid, np.concatenate(samples)).reshape(len(templates), -1).mean(axis=1)
+    return tuple(
+        replace(t, M=float(m), M_floor=float(sampling_floor(max(t.points, 1) / area)))
+        for t, m, area in zip(templates, distances, areas, strict=True)
+    )
+
+
+def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:
+    gap = nearest_distance(grid, pick)
+    if gap > max(10 * spacing, 0.05 * extent):
+        raise ValueError(
+            f"at: expected a point on or near the scan, got {_text(pick)}, {gap:.4g} from the nearest point; "
+            "pick a point of the scan"
+        )
+
+
+def _hints(direction: ArrayLike | None, width: float | None, height: float | None, kind: str) -> Hints:
+    if kind not in KINDS:
+        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    along = None
+    if direction is not None:
+        along = _vector(direction, "direction")
+        if not np.linalg.norm(along) > 0:
+            raise ValueError("direction: expected a vector of some length, got zero; leave it out to have it found")
+        along = along / np.linalg.norm(along)
+    return Hints(
+        along,
+        None if width is None else _positive(width, "width"),
+        None if height is None else _positive(height, "height"),
+        kind,
+    )
+
+
+def _positive(value: Any, name: str, whole: bool = False) -> Any:
+    number = _number(value)
+    if not (np.isfinite(number) and number > 0) or (whole and number != int(number)):
+        what = "whole number" if whole else "number"
+        raise ValueError(f"{name}: expected a {what} above 0, got {value!r}; leave it out to have it found")
+    return int(number) if whole else number
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return float("nan")
+
+
+def _vector(value: ArrayLike, name: str) -> Array:
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name}: expected three finite numbers x, y, z, got {value!r}")
+    return vector
+
+
+def _text(point: Array) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in point) + ")"

@@ -1,0 +1,194 @@
+"""The ridge feature: stations with height and width, from which its surface is regenerated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ridgefeature.bspline import Surface
+from ridgefeature.merge import LEAST_BORDER, along, merged_surface
+from ridgefeature.scan import Scan, Source, as_scan
+from ridgefeature.section import Section
+from ridgefeature.settings import Settings
+from ridgefeature.stations import Stations
+from ridgefeature.template import Template
+
+Array = NDArray[np.float64]
+Profile = float | Callable[[Array], ArrayLike]
+
+
+@dataclass(frozen=True, eq=False)
+class Ridge(Stations):
+    """A registered ridge. It holds what was found; shape is derived from it.
+
+    Lengths in the unit of the scan, coordinates in its frame, k stations evenly spaced in arc length. `height` is
+    the apex over the base; `width` the distance between the feet, where the section meets the base;
+    `half_height_width` the full width at half height. The `_std` are one standard deviation. `closed` tells
+    whether the ridge is a ring; `stop` why each end stopped, in words.
+    """
+
+    section: Section
+    templates: tuple[Template, ...]
+    stop: tuple[str, str]
+    closed: bool = False
+    unit: str = "mm"
+    pick: Array = field(default_factory=lambda: np.zeros(3))
+    settings: Settings = field(default_factory=Settings)
+    source: Source | None = None
+
+    @property
+    def half_height_width(self) -> Array:
+        """(k,) full width at half height."""
+        return self.width * self.section.half_height_width
+
+    @property
+    def across(self) -> Array:
+        """(k, 3) unit vectors to the left of the path, square to tangent and normal."""
+        return np.cross(self.normal, self.tangent)
+
+    @property
+    def length(self) -> float:
+        """Arc length of the whole ridge."""
+        return float(self.arc_length[-1])
+
+    @cached_property
+    def _surface(self) -> Surface:
+        return merged_surface(
+            self.arc_length, self.spine, self.across, self.normal, self.height, self.width, self.border, self.section
+        )
+
+    def surface(self) -> Surface:
+        """The finished surface, C2 and bicubic: u is arc length, v the distance from the spine in widths.
+
+        Poles depend on the stations alone; for the same stations they are affine in height and in width.
+        """
+        return self._surface
+
+    def resized(self, h: float | None = None, w: float | None = None, *, height: Profile | None = None,
+                width: Profile | None = None, between: tuple[float, float] | None = None) -> Ridge:
+        """The ridge with other heights or widths; the border of its flanks stays.
+
+        h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a function of
+        arc length (k,) -> (k,). between: arc lengths (s0, s1) of the stretch that changes, blended smoothly inside
+        it over a third of the stretch or one width, whichever is less. Standard deviations follow.
+        Raises ValueError for both a rate and an absolute value, values that are not finite, w or width not
+        above 0, a width too large for the flanks, or a stretch that is not on the ridge.
+        """
+        blend = self._blend(between)
+        new_height, height_rate = self._changed("height", "h", self.height, h, height, blend)
+        new_width, width_rate = self._changed("width", "w", self.width, w, width, blend)
+        if not (new_width > 0).all():
+            raise ValueError(f"width: expected values above 0 everywhere, got {new_width.min():g}; use a larger w")
+        room = self.border / LEAST_BORDER
+        if (new_width > room).any():
+            i = int(np.argmax(new_width / room))
+            raise ValueError(
+                f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet stay on "
+                f"the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
+            )
+        return replace(
+            self, height=new_height, width=new_width,
+            height_std=self.height_std * np.abs(height_rate), width_std=self.width_std * width_rate,
+        )
+
+    def _changed(self, name: str, rate_name: str, old: Array, rate: float | None, absolute: Profile | None,
+                 blend: Array) -> tuple[Array, Array]:
+        """New values and their local rates."""
+        if rate is not None and absolute is not None:
+            raise ValueError(f"expected either the rate {rate_name} or the absolute {name}, got both; drop one")
+        if absolute is not None:
+            wanted = absolute(self.arc_length) if callable(absolute) else absolute
+            goal = np.broadcast_to(_finite(wanted, name), old.shape)
+        elif rate is not None:
+            goal = old * float(_finite(rate, rate_name))
+        else:
+            return old, np.ones_like(old)
+        new = old + blend * (goal - old)
+        return new, np.divide(new, old, out=np.ones_like(old), where=old != 0)
+
+    def _blend(self, between: tuple[float, float] | None) -> Array:
+        if between is None:
+            return np.ones_like(self.arc_length)
+        low, high = (float(x) for x in _finite(between, "between"))
+        if not 0 <= low < high <= self.length * (1 + 1e-12):
+            raise ValueError(
+                f"between: expected 0 <= s0 < s1 <= {self.length:g}, the ridge's arc length, got ({low:g}, {high:g})"
+            )
+        ramp = min((high - low) / 3, float(np.median(self.width)))
+        # An end of the ridge needs no ramp: there is nothing beyond it to blend with.
+        rise = 1.0 if low <= 0 else np.clip((self.arc_length - low) / ramp, 0, 1)
+        fall = 1.0 if high >= self.length else np.clip((high - self.arc_length) / ramp, 0, 1)
+        x = np.minimum(rise, fall) * np.ones_like(self.arc_length)
+        return x**3 * (10 - 15 * x + 6 * x * x)
+
+    def section_at(self, s: float, n: int = 101, h: float = 1.0, w: float = 1.0) -> Array:
+        """Points (n, 2) across the finished surface at arc length s: y to the left, z up, in the station's frame.
+
+        From border to border, with the rates h and w applied. Raises ValueError for s off the ridge or n < 2.
+        """
+        if not 0 <= float(_finite(s, "s")) <= self.length * (1 + 1e-12):
+            raise ValueError(f"s: expected an arc length from 0 to {self.length:g}, got {s:g}")
+        if n < 2:
+            raise ValueError(f"n: expected at least 2 points, got {n}")
+        ridge = self if h == 1 and w == 1 else self.resized(h, w)
+        surface = ridge.surface()
+        v = np.linspace(*surface.domain[1], n)
+        at = np.array([min(float(s), self.length)])
+        points = surface(at, v)
+        origin, tangent, normal = (along(self.arc_length, x, at)[0] for x in (self.spine, self.tangent, self.normal))
+        left = np.cross(normal, tangent)
+        left /= np.linalg.norm(left)
+        up = np.cross(tangent, left)
+        up /= np.linalg.norm(up)
+        return np.column_stack([(points - origin) @ left, (points - origin) @ up])
+
+    def distance(self, scan: Scan | ArrayLike) -> Array:
+        """Signed distance (n,) of scan points to the finished surface, positive on the side of the normal.
+
+        NaN for points whose foot lies beyond the surface's border.
+        """
+        points = scan.points if isinstance(scan, Scan) else as_scan(scan, self.unit).points
+        return self.surface().project(points)[2]
+
+    def save(self, path: Any) -> None:
+        """Write the feature as versioned JSON, exact to the last bit. Raises OSError if it cannot be written."""
+        from ridgefeature.io.feature import write_feature
+
+        write_feature(self, path)
+
+    def summary(self) -> dict[str, Any]:
+        """Figures of the ridge as plain numbers and words, for a table or for JSON."""
+        return {
+            "unit": self.unit,
+            "length": self.length,
+            "templates": len(self.templates),
+            "height_min": float(self.height.min()),
+            "height_max": float(self.height.max()),
+            "width_min": float(self.width.min()),
+            "width_max": float(self.width.max()),
+            "half_height_width_min": float(self.half_height_width.min()),
+            "half_height_width_max": float(self.half_height_width.max()),
+            "section": self.section.name,
+            "closed": self.closed,
+            "stop_start": self.stop[0],
+            "stop_end": self.stop[1],
+            "noise": float(np.median([t.scale for t in self.templates])),
+            "M": float(np.mean([t.M for t in self.templates])),
+            "M_floor": float(np.mean([t.M_floor for t in self.templates])),
+            "settings": asdict(self.settings),
+        }
+
+
+def _finite(value: Any, name: str) -> Array:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: expected finite numbers, got {value!r}")
+    return array

@@ -1,0 +1,126 @@
+"""Stations: a chain of templates as functions of arc length, on one C2 spine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.basis import basis_matrix
+from ridgefeature.bspline import Curve
+from ridgefeature.settings import Settings
+from ridgefeature.template import Template
+
+Array = NDArray[np.float64]
+
+_PER_TEMPLATE = 4
+_MOST = 401
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """k places along a ridge, evenly spaced in arc length, in the frame and unit of the scan."""
+
+    arc_length: Array
+    """(k,) ascending from 0."""
+    spine: Array
+    """(k, 3) centre line on the base, under the apex."""
+    tangent: Array
+    """(k, 3) unit."""
+    normal: Array
+    """(k, 3) unit, square to the tangent."""
+    height: Array
+    width: Array
+    height_std: Array
+    width_std: Array
+    border: Array
+    """(k,) distance of the flanks' outer borders from the spine; a change of h or w does not move them."""
+
+
+def natural_spline_matrix(sites: Array, at: Array) -> Array:
+    """Linear map (m, n) from values at sites (n,), ascending, to the natural cubic spline at `at` (m,).
+
+    Beyond the sites the spline goes on straight. One site: constant. (de Boor, A Practical Guide to Splines, ch. 4.)
+    """
+    n = len(sites)
+    if n == 1:
+        return np.ones((len(at), 1))
+    step = np.diff(sites)
+    second = np.zeros((n, n))
+    if n > 2:
+        system = np.diag((step[:-1] + step[1:]) / 3) + np.diag(step[1:-1] / 6, 1) + np.diag(step[1:-1] / 6, -1)
+        inner = np.arange(n - 2)
+        right = np.zeros((n - 2, n))
+        right[inner, inner] = 1 / step[:-1]
+        right[inner, inner + 1] = -1 / step[:-1] - 1 / step[1:]
+        right[inner, inner + 2] = 1 / step[1:]
+        second[1:-1] = np.linalg.solve(system, right)
+    held = np.clip(at, sites[0], sites[-1])
+    i = np.clip(np.searchsorted(sites, held, side="right") - 1, 0, n - 2)
+    h, row = step[i], np.arange(len(at))
+    b = (held - sites[i]) / h
+    a = 1 - b
+    out = ((a**3 - a) * h**2 / 6)[:, None] * second[i] + ((b**3 - b) * h**2 / 6)[:, None] * second[i + 1]
+    out[row, i] += a
+    out[row, i + 1] += b
+    for end, inner, sign in ((0, 1, -1.0), (n - 1, n - 2, 1.0)):
+        slope = sign * abs(sites[end] - sites[inner]) / 6 * second[inner]
+        slope[end] += sign / abs(sites[end] - sites[inner])
+        slope[inner] -= sign / abs(sites[end] - sites[inner])
+        beyond = (at < sites[0]) if end == 0 else (at > sites[-1])
+        out[beyond] += (at[beyond] - sites[end])[:, None] * slope
+    return out
+
+
+def interpolating_curve(sites: Array, points: Array) -> Curve:
+    """Cubic spline (n, d) through points at sites (n,), not-a-knot; of lower degree below four points."""
+    n = len(sites)
+    degree = min(3, n - 1)
+    inner = sites[2:-2] if n > 4 else sites[:0]
+    knots = np.concatenate([np.full(degree + 1, sites[0]), inner, np.full(degree + 1, sites[-1])])
+    return Curve(np.linalg.solve(basis_matrix(knots, degree, sites), points), knots, degree)
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _on_path(template: Template, x: float) -> Array:
+    """Point of the template's bent spine at x along it."""
+    return template.position + template.rotation @ np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
+
+
+def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
+    """Stations of a chain of fitted templates.
+
+    The spine is a C2 spline through the templates' centres and outer ends; height and width are natural cubic
+    splines through the templates' values in arc length, so the standard deviations follow by the same linear map.
+    """
+    first, last = templates[0], templates[-1]
+    sites = np.array([_on_path(first, -0.5 * first.length), *(t.position for t in templates),
+                      _on_path(last, 0.5 * last.length)])
+    chords = np.linalg.norm(np.diff(sites, axis=0), axis=1)
+    path = interpolating_curve(np.concatenate([[0.0], np.cumsum(chords)]), sites)
+    total = float(path.arc_length())
+    k = int(np.clip(_PER_TEMPLATE * len(templates) + 1, 13, _MOST))
+    s = np.linspace(0.0, total, k)
+    t = path.at_arc_length(s)
+    at = path.arc_length(path.domain[0], np.cumsum(chords)[: len(templates)])
+    tangent = _unit(path(t, 1))
+    ends = np.concatenate([[0.0], at, [total]])
+    up = np.array([first.rotation[:, 2], *(q.rotation[:, 2] for q in templates), last.rotation[:, 2]])
+    normal = natural_spline_matrix(ends, s) @ up
+    normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    spread = natural_spline_matrix(at, s)
+    std = np.array([(q.std[6], q.std[7]) if q.std is not None else (np.inf, np.inf) for q in templates])
+    widths = np.array([q.width for q in templates])
+    width = np.maximum(spread @ widths, 0.25 * widths.min())
+    height_std, width_std = np.sqrt(spread**2 @ std**2).T
+    curvature = np.interp(s, at, [abs(q.trend[0]) for q in templates])
+    border = np.minimum((0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width))
+    return Stations(
+        arc_length=s, spine=path(t), tangent=tangent, normal=normal,
+        height=spread @ np.array([q.height for q in templates]), width=width,
+        height_std=height_std, width_std=width_std, border=border,
+    )
