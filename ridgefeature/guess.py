@@ -109,7 +109,7 @@ def guess(window: Window, pick: Array, extent: float, hints: Hints, section: Sec
 
 def _score(template: Template, pick: Array) -> float:
     """Evidence for a template under the pick, for a fixed number of points; 0 if it does not hold the pick."""
-    if template.std is None or template.status == "failed" or template.height == 0:
+    if template.status in ("failed", "no data") or template.height == 0:
         return 0.0
     local = template.rotation.T @ (pick - template.position)
     if abs(local[1]) > 0.55 * template.width:

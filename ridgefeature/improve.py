@@ -15,8 +15,11 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 FEWEST_POINTS = 12
-SMALLEST_SCALE = 2e-3
+SMALLEST_SCALE = 5e-3
 """Noise scale in parts of the height below which residuals are the model's own: no point is an outlier there."""
+
+LEAST_CONTRAST = 0.05
+"""Noise scale in parts of the height that evidence assumes at least, so that misfit of the model does not count."""
 
 _LOSS = {"huber": kernel.HUBER, "tukey": kernel.TUKEY, "square": kernel.SQUARE, "cauchy": kernel.CAUCHY}
 _FREE = np.array([1, 2, 3, 4, 5, 6, 7])  # sliding along a straight ridge is not observable
@@ -32,41 +35,10 @@ def loss_of(settings: Settings) -> tuple[int, float]:
     return _LOSS[settings.loss], settings.tuning
 
 
-def _whitening(normal: Array) -> Array:
-    """(8, 7) transform whose Hessian is near unity, height and width each an axis of their own.
-
-    The five placements are whitened by the Cholesky factor of their block and follow height and width along
-    the valley floor, so bounds on height and width stay simple bounds.
-    """
-    h = normal[_BLOCK]
-    diagonal = np.diag(h)
-    h = h + np.diag(1e-9 * diagonal + 1e-12 * diagonal.max() + 1e-300)
-    a, b, c = h[:5, :5], h[:5, 5:], h[5:, 5:]
-    lower = np.linalg.cholesky(a)
-    half = np.linalg.solve(lower, b)
-    inverse = np.linalg.inv(lower).T
-    valley = -inverse @ half
-    own = np.diag(c)
-    steps = 1.0 / np.sqrt(np.maximum(own - (half * half).sum(axis=0), 1e-4 * own + 1e-300))
-    transform = np.zeros((8, 7))
-    transform[1:6, :5] = inverse
-    transform[1:6, 5:] = valley * steps
-    transform[6, 5], transform[7, 6] = steps
-    return transform
-
-
 def _moved(template: Template, p: Array) -> Template:
     """The template after increments p (8,) in its own frame."""
-    turned = template.rotation @ kernel.rotation_of(p[3:6])[0]
-    # One step of Newton's iteration keeps long chains of products orthonormal.
-    turned = turned @ (1.5 * np.eye(3) - 0.5 * turned.T @ turned)
-    return replace(
-        template,
-        position=template.position + template.rotation @ p[:3],
-        rotation=turned,
-        height=float(p[6]),
-        width=float(p[7]),
-    )
+    position, rotation = kernel.moved(template.position, template.rotation, p)
+    return replace(template, position=position, rotation=rotation, height=float(p[6]), width=float(p[7]))
 
 
 def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, float], tolerance: float,
@@ -74,8 +46,10 @@ def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, 
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
     table, trend = template.section.table, template.trend
     h, w = template.height, template.width
-    normal = kernel.normal_matrix(points, h, w, trend, table, scale, *_HUBER)[0]
-    transform = _whitening(normal / len(points))
+    # A few hundred points are enough to precondition.
+    some = points[:: max(len(points) // 300, 1)]
+    normal = kernel.normal_matrix(some, h, w, trend, table, scale, *_HUBER)[0]
+    transform = kernel.whitening(normal / len(some))
     start = np.array([0, 0, 0, 0, 0, 0, h, w])
     number, tuning = loss
 
@@ -103,10 +77,11 @@ def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, 
 
 
 def _scale(points: Array, template: Template) -> float:
-    """Robust standard deviation of the residuals, from the median of their absolute values."""
-    r = kernel.residuals(points, template.height, template.width, template.trend, template.section.table)
+    """Robust standard deviation of the residuals."""
     floor = SMALLEST_SCALE * max(abs(template.height), 1e-3 * template.width)
-    return max(1.4826 * kernel.median_absolute(r), floor)
+    return float(kernel.robust_scale(
+        points, template.height, template.width, template.trend, template.section.table, floor
+    ))
 
 
 def _bounds(start: Template, settings: Settings) -> Bounds:
@@ -147,28 +122,34 @@ def _rounds(window: Window, template: Template, bounds: Bounds, tolerance: float
         evaluations += n
         if abs(template.width / before - 1) < agree:
             break
-    return judge(window, replace(template, scale=scale, evaluations=evaluations, status=status), settings)
+    return replace(
+        template, scale=scale, evaluations=evaluations, status=status, points=len(points),
+        evidence=_evidence(points, template, scale, settings),
+    )
+
+
+def _evidence(points: Array, template: Template, scale: float, settings: Settings) -> float:
+    """Twice the log likelihood ratio of ridge against plane; misfit of a few per cent of the height is no evidence."""
+    scale = max(scale, LEAST_CONTRAST * abs(template.height))
+    return float(kernel.evidence(
+        points, template.height, template.width, template.trend, template.section.table, scale, *loss_of(settings)
+    ))
 
 
 def judge(window: Window, template: Template, settings: Settings) -> Template:
-    """The template with standard deviations, counts and evidence as its window gives them."""
+    """The template with standard deviations and counts as its window gives them."""
     points = window(template)
-    if len(points) < FEWEST_POINTS:
-        return replace(template, status="no data", points=len(points), std=None)
-    h, w, trend, table, scale = template.height, template.width, template.trend, template.section.table, template.scale
-    loss, tuning = loss_of(settings)
-    _, plain, sums = kernel.normal_matrix(points, h, w, trend, table, scale, loss, tuning)
-    n, psi2, slope = sums
     std = np.full(8, np.inf)
     std[0] = 0.0
+    if len(points) < FEWEST_POINTS:
+        return replace(template, std=std)
+    h, w, trend, table, scale = template.height, template.width, template.trend, template.section.table, template.scale
+    _, plain, (n, psi2, slope) = kernel.normal_matrix(points, h, w, trend, table, scale, *loss_of(settings))
     if n > 8 and slope > 0:
         block = plain[_BLOCK]
-        d = 1 / np.sqrt(np.maximum(np.diag(block), 1e-300))
+        d = 1 / np.sqrt(np.maximum(block.diagonal(), 1e-300))
         inverse = np.linalg.pinv(block * np.outer(d, d), hermitian=True) * np.outer(d, d)
         # Asymptotic variance of an M-estimator (Huber 1981, 7.6), with its small-sample factor.
         factor = n * psi2 / slope**2 * n / (n - 7)
-        std[_FREE] = np.sqrt(np.diag(inverse) * factor)
-    r = kernel.residuals(points, h, w, trend, table)
-    ridge = kernel.losses(r / scale, loss, tuning).sum()
-    flat = kernel.plane_loss(points, scale, loss, tuning, 6)
-    return replace(template, std=std, evidence=2 * float(flat - ridge), points=len(points), inliers=int(n))
+        std[_FREE] = np.sqrt(inverse.diagonal() * factor)
+    return replace(template, std=std, points=len(points), inliers=int(n))

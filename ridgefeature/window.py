@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.grid import Grid, nearest_distances, points_in_ball, points_in_box, typical_spacing
+from ridgefeature.grid import Grid, nearest_distances, points_in_ball, points_in_box
 from ridgefeature.kernels.residual import select
 from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
 
-MOST_POINTS = 3000
-"""Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
 _MARGIN = 1.25
 
 
@@ -23,12 +21,11 @@ class Window:
     """Points around a template, from the grid index; neighbouring requests share one look-up."""
 
     grid: Grid
-    spacing: float = field(init=False)
+    spacing: float
+    most: int = 3000
+    """Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
     _frame: tuple[Array, Array, Array] | None = field(default=None, init=False)
     _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
-
-    def __post_init__(self) -> None:
-        self.spacing = typical_spacing(self.grid)
 
     def __call__(self, template: Template, before: float = 1.0, after: float = 1.0) -> Array:
         """Points (m, 3) in the template's frame.
@@ -60,9 +57,9 @@ class Window:
     def _look_up(self, centre: Array, rotation: Array, half: Array) -> None:
         expected = 4 * half[0] * half[1] * (0.5 / max(self.spacing, 1e-300)) ** 2
         cells = None
-        if expected > MOST_POINTS:
+        if expected > self.most:
             ratio = half[0] / half[1]
-            cells = (max(round(np.sqrt(0.5 * MOST_POINTS * ratio)), 1), max(round(np.sqrt(0.5 * MOST_POINTS / ratio)), 1))
+            cells = (max(round(np.sqrt(0.5 * self.most * ratio)), 1), max(round(np.sqrt(0.5 * self.most / ratio)), 1))
         self._points = points_in_box(self.grid, centre, rotation.T, half, cells)
         self._frame = (centre, rotation, half)
 

@@ -75,6 +75,107 @@ def loss_jet(x, loss, tuning):
 
 
 @njit(cache=True)
+def cholesky_in_place(a):
+    """Lower Cholesky factor in the lower triangle of a (n, n); False where a is not positive definite."""
+    n = a.shape[0]
+    for j in range(n):
+        d = a[j, j]
+        least = 1e-14 * d
+        for k in range(j):
+            d -= a[j, k] * a[j, k]
+        if not d > least:
+            return False
+        a[j, j] = math.sqrt(d)
+        for i in range(j + 1, n):
+            s = a[i, j]
+            for k in range(j):
+                s -= a[i, k] * a[j, k]
+            a[i, j] = s / a[j, j]
+    return True
+
+
+@njit(cache=True)
+def solve_in_place(a, b):
+    """Solve a x = b for symmetric positive definite a (lower triangle read, overwritten); x replaces b."""
+    if not cholesky_in_place(a):
+        return False
+    n = b.size
+    for i in range(n):
+        for k in range(i):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[k, i] * b[k]
+        b[i] /= a[i, i]
+    return True
+
+
+@njit(cache=True)
+def whitening(normal):
+    """(8, 7) transform whose Hessian is near unity, height and width each an axis of their own.
+
+    The first parameter (sliding) stays fixed. The other five placements are whitened by the Cholesky factor of
+    their block and follow height and width along the valley floor, so that bounds on height and width stay simple
+    bounds. normal (8, 8) of the mean loss.
+    """
+    lower = normal[1:, 1:].copy()
+    most = 0.0
+    for i in range(7):
+        most = max(most, lower[i, i])
+    for i in range(7):
+        lower[i, i] += 1e-9 * lower[i, i] + 1e-12 * most + 1e-300
+    transform = np.zeros((8, 7))
+    if not cholesky_in_place(lower):
+        for i in range(7):
+            transform[i + 1, i] = 1.0 / math.sqrt(normal[i + 1, i + 1] + 1e-9 * most + 1e-300)
+        return transform
+    for j in range(5):
+        for i in range(j, -1, -1):
+            s = 1.0 if i == j else 0.0
+            for k in range(i + 1, j + 1):
+                s -= lower[k, i] * transform[k + 1, j]
+            transform[i + 1, j] = s / lower[i, i]
+    for column in range(5, 7):
+        own = lower[column, column] ** 2
+        if column == 6:
+            own += lower[6, 5] ** 2
+        step = 1.0 / math.sqrt(own)
+        for i in range(4, -1, -1):
+            s = -lower[column, i] * step
+            for k in range(i + 1, 5):
+                s -= lower[k, i] * transform[k + 1, column]
+            transform[i + 1, column] = s / lower[i, i]
+        transform[column + 1, column] = step
+    return transform
+
+
+@njit(cache=True)
+def moved(position, rotation, p):
+    """Position (3,) and rotation (3, 3) after increments p (8,) in the frame they make."""
+    turn, _ = rotation_of(p[3:6])
+    turned = np.zeros((3, 3))
+    place = position.copy()
+    for i in range(3):
+        for j in range(3):
+            place[i] += rotation[i, j] * p[j]
+            for k in range(3):
+                turned[i, j] += rotation[i, k] * turn[k, j]
+    # Gram-Schmidt keeps long chains of products orthonormal.
+    out = np.empty((3, 3))
+    for j in range(3):
+        column = turned[:, j].copy()
+        for k in range(j):
+            dot = column[0] * out[0, k] + column[1] * out[1, k] + column[2] * out[2, k]
+            for i in range(3):
+                column[i] -= dot * out[i, k]
+        size = math.sqrt(column[0] ** 2 + column[1] ** 2 + column[2] ** 2)
+        for i in range(3):
+            out[i, j] = column[i] / size
+    return place, out
+
+
+@njit(cache=True)
 def rotation_of(vector):
     """Rotation matrix (columns: new axes in the old frame) and right Jacobian of a rotation vector."""
     x, y, z = vector[0], vector[1], vector[2]
@@ -189,6 +290,15 @@ def normal_matrix(points, height, width, trend, table, scale, loss, tuning):
 
 
 @njit(cache=True)
+def robust_scale(points, height, width, trend, table, floor):
+    """Standard deviation of the residuals from the median of their absolute values, not below floor."""
+    out = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
+        out[i] = abs(residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0])
+    return max(1.4826 * np.median(out), floor)
+
+
+@njit(cache=True)
 def residuals(points, height, width, trend, table):
     """Residuals (n,) of points (n, 3) in the template's frame."""
     out = np.empty(points.shape[0])
@@ -198,18 +308,22 @@ def residuals(points, height, width, trend, table):
 
 
 @njit(cache=True)
+def evidence(points, height, width, trend, table, scale, loss, tuning):
+    """Twice the loss that a plane has more than the template; points (n, 3) in the template's frame."""
+    ridge = 0.0
+    for i in range(points.shape[0]):
+        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0]
+        ridge += loss_jet(r / scale, loss, tuning)[0]
+    return 2.0 * (plane_loss(points, scale, loss, tuning, 5) - ridge)
+
+
+@njit(cache=True)
 def losses(x, loss, tuning):
     """Loss (n,) of residuals x (n,) in units of their scale."""
     out = np.empty(x.size)
     for i in range(x.size):
         out[i] = loss_jet(x[i], loss, tuning)[0]
     return out
-
-
-@njit(cache=True)
-def median_absolute(x):
-    """Median of |x|."""
-    return np.median(np.abs(x))
 
 
 @njit(cache=True)
@@ -231,34 +345,30 @@ def select(points, shift, rotation, low_x, high_x, half_y, half_z):
 @njit(cache=True)
 def plane_loss(points, scale, loss, tuning, iterations):
     """Smallest robust loss of a plane z = a + b x + c y found by reweighting; points (n, 3)."""
-    abc = np.zeros(3)
+    normal = np.zeros((3, 3))
+    right = np.zeros(3)
+    plane = np.zeros(3)
     best = np.inf
     for _ in range(iterations):
-        m = np.zeros((3, 3))
-        v = np.zeros(3)
+        normal[:] = 0.0
+        right[:] = 0.0
         total = 0.0
         for i in range(points.shape[0]):
             x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            r = z - abc[0] - abc[1] * x - abc[2] * y
+            r = z - plane[0] - plane[1] * x - plane[2] * y
             rho, _, weight = loss_jet(r / scale, loss, tuning)
             total += rho
-            m[0, 0] += weight
-            m[0, 1] += weight * x
-            m[0, 2] += weight * y
-            m[1, 1] += weight * x * x
-            m[1, 2] += weight * x * y
-            m[2, 2] += weight * y * y
-            v[0] += weight * r
-            v[1] += weight * r * x
-            v[2] += weight * r * y
+            normal[0, 0] += weight
+            normal[1, 0] += weight * x
+            normal[2, 0] += weight * y
+            normal[1, 1] += weight * x * x
+            normal[2, 1] += weight * x * y
+            normal[2, 2] += weight * y * y
+            right[0] += weight * r
+            right[1] += weight * r * x
+            right[2] += weight * r * y
         best = min(best, total)
-        m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
-        det = (
-            m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
-            - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
-            + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
-        )
-        if not abs(det) > 1e-12 * m[0, 0] * m[1, 1] * m[2, 2]:
+        if not solve_in_place(normal, right):
             break
-        abc += np.linalg.solve(m, v)
+        plane += right
     return best

@@ -7,6 +7,21 @@ import math
 import numpy as np
 from numba import njit
 
+from ridgefeature.kernels.residual import solve_in_place
+
+
+@njit(cache=True, inline="always")
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def _product(matrix, vector):
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = _dot(matrix[i], vector)
+    return out
+
 
 @njit(cache=True)
 def best_straight_ridge(points, width, angles, offsets, table, sign):
@@ -36,11 +51,13 @@ def best_straight_ridge(points, width, angles, offsets, table, sign):
         zz += z * z
     moments[1, 0], moments[2, 0], moments[2, 1] = moments[0, 1], moments[0, 2], moments[1, 2]
     best = np.zeros(7)
-    if not np.linalg.det(moments) > 1e-9 * moments[0, 0] * moments[1, 1] * moments[2, 2]:
-        return best
-    inverse = np.linalg.inv(moments)
-    plane = inverse @ z_moments
-    left = zz - z_moments @ plane
+    inverse = np.eye(3)
+    for k in range(3):
+        factor = moments.copy()
+        if not solve_in_place(factor, inverse[k]):
+            return best
+    plane = _product(inverse, z_moments)
+    left = zz - _dot(z_moments, plane)
     if not left > 0.0:
         return best
     g_moments = np.empty(3)
@@ -61,15 +78,15 @@ def best_straight_ridge(points, width, angles, offsets, table, sign):
                     g_moments[2] += g * y
                     gg += g * g
                     gz += g * points[i, 2]
-            spread = gg - g_moments @ (inverse @ g_moments)
+            follows = _product(inverse, g_moments)
+            spread = gg - _dot(g_moments, follows)
             if not spread > 1e-3 * gg:
                 continue
-            height = (gz - g_moments @ plane) / spread
+            height = (gz - _dot(g_moments, plane)) / spread
             if height * sign < 0.0:
                 continue
             explained = height * height * spread / left
             if explained > best[0]:
-                base = plane - height * (inverse @ g_moments)
                 best[0], best[1], best[2], best[3] = explained, angle, offset, height
-                best[4:] = base
+                best[4:] = plane - height * follows
     return best
