@@ -1,0 +1,198 @@
+"""The points of a box or of a ball, from a cell grid; the arrays are those of grid.py."""
+
+import numpy as np
+from numba import njit
+
+from .grid import LIMIT, before, cell_index
+
+
+@njit(cache=True)
+def _sort_rows(rows, first, last):
+    """Sort rows[first:last] by x, then y, then z, in place (Shell sort: short runs, no worst case of n^2)."""
+    gap = 1
+    while gap < (last - first) // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(first + gap, last):
+            x, y, z = rows[i, 0], rows[i, 1], rows[i, 2]
+            j = i - gap
+            while j >= first and (
+                rows[j, 0] > x
+                or (rows[j, 0] == x and (rows[j, 1] > y or (rows[j, 1] == y and rows[j, 2] > z)))
+            ):
+                rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = rows[j, 0], rows[j, 1], rows[j, 2]
+                j -= gap
+            rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = x, y, z
+        gap //= 3
+
+
+@njit(cache=True)
+def _span(levels, frame, axis, low, high):
+    """First and last cell along an axis for coordinates from low to high."""
+    first = cell_index(low, frame[axis], frame[6 + axis], levels[0, axis])
+    return first, cell_index(high, frame[axis], frame[6 + axis], levels[0, axis])
+
+
+@njit(cache=True)
+def _slab(levels, frame, axis, index):
+    """Smallest and largest coordinate of the points in the cells with this index along an axis."""
+    low = frame[axis] + index * frame[3 + axis] - frame[15 + axis]
+    high = frame[axis] + (index + 1) * frame[3 + axis] + frame[15 + axis]
+    if index == 0:
+        low = min(low, frame[9 + axis])
+    if index == levels[0, axis] - 1:
+        high = max(high, frame[12 + axis])
+    return low, high
+
+
+@njit(cache=True)
+def _box_reach(frame, origin, axes, half, reach):
+    """Half sizes (3,) of the box's axis-aligned bounds, into reach; returns a length far above rounding."""
+    scale = 0.0
+    for a in range(3):
+        scale += abs(origin[a]) + half[a] + max(abs(frame[9 + a]), abs(frame[12 + a]))
+    pad = 1e-11 * scale
+    for a in range(3):
+        reach[a] = pad
+        for j in range(3):
+            reach[a] += abs(axes[j, a]) * half[j]
+    return pad
+
+
+@njit(cache=True)
+def _clip_row(levels, frame, origin, axes, half, reach, pad, y, z):
+    """First and last cell of the row (y, z) that may meet the oriented box; last < first if none does."""
+    y0, y1 = _slab(levels, frame, 1, y)
+    z0, z1 = _slab(levels, frame, 2, z)
+    y0, y1, z0, z1 = y0 - origin[1], y1 - origin[1], z0 - origin[2], z1 - origin[2]
+    low, high = -reach[0], reach[0]
+    for j in range(3):
+        ax, ay, az = axes[j, 0], axes[j, 1], axes[j, 2]
+        most = half[j] + pad - min(ay * y0, ay * y1) - min(az * z0, az * z1)
+        least = -half[j] - pad - max(ay * y0, ay * y1) - max(az * z0, az * z1)
+        if abs(ax) > 1e-12:
+            low = max(low, min(least / ax, most / ax) - pad)
+            high = min(high, max(least / ax, most / ax) + pad)
+        elif least > 0.0 or most < 0.0:
+            return 0, -1
+    if low > high:
+        return 0, -1
+    return _span(levels, frame, 0, origin[0] + low, origin[0] + high)
+
+
+@njit(cache=True)
+def box_points(points, starts, levels, frame, origin, axes, half):
+    """Box coordinates of the points of a box, in a buffer, and their number: by cell, sorted in each."""
+    reach = np.empty(3)
+    pad = _box_reach(frame, origin, axes, half, reach)
+    first_y, last_y = _span(levels, frame, 1, origin[1] - reach[1], origin[1] + reach[1])
+    first_z, last_z = _span(levels, frame, 2, origin[2] - reach[2], origin[2] + reach[2])
+    rows = (last_y - first_y + 1) * (last_z - first_z + 1)
+    spans = np.empty((rows, 2), np.int64)
+    total = 0
+    i = 0
+    for z in range(first_z, last_z + 1):
+        for y in range(first_y, last_y + 1):
+            x0, x1 = _clip_row(levels, frame, origin, axes, half, reach, pad, y, z)
+            row = (z * levels[0, 1] + y) * levels[0, 0]
+            spans[i, 0], spans[i, 1] = row + x0, row + x1 + 1
+            total += starts[row + x1 + 1] - starts[row + x0] if x1 >= x0 else 0
+            i += 1
+    out = np.empty((total, 3))
+    m = 0
+    for i in range(rows):
+        for c in range(spans[i, 0], spans[i, 1]):
+            run = m
+            for j in range(starts[c], starts[c + 1]):
+                dx, dy, dz = points[j, 0] - origin[0], points[j, 1] - origin[1], points[j, 2] - origin[2]
+                inside = True
+                for a in range(3):
+                    out[m, a] = dx * axes[a, 0] + dy * axes[a, 1] + dz * axes[a, 2]
+                    inside &= abs(out[m, a]) <= half[a]
+                m += inside
+            _sort_rows(out, run, m)
+    return out, m
+
+
+@njit(cache=True)
+def box_bins(points, starts, levels, frame, origin, axes, half, nx, ny):
+    """Box coordinates (m, 3) of the point nearest to the centre of every occupied bin, bin by bin."""
+    reach = np.empty(3)
+    pad = _box_reach(frame, origin, axes, half, reach)
+    first_y, last_y = _span(levels, frame, 1, origin[1] - reach[1], origin[1] + reach[1])
+    first_z, last_z = _span(levels, frame, 2, origin[2] - reach[2], origin[2] + reach[2])
+    best = np.full(nx * ny, np.inf)
+    kept = np.empty((nx * ny, 3))
+    one = np.empty((1, 3))
+    wide_x, wide_y = 2.0 * half[0] / nx, 2.0 * half[1] / ny
+    for z in range(first_z, last_z + 1):
+        for y in range(first_y, last_y + 1):
+            x0, x1 = _clip_row(levels, frame, origin, axes, half, reach, pad, y, z)
+            row = (z * levels[0, 1] + y) * levels[0, 0]
+            if x1 < x0:
+                continue
+            for j in range(starts[row + x0], starts[row + x1 + 1]):
+                dx, dy, dz = points[j, 0] - origin[0], points[j, 1] - origin[1], points[j, 2] - origin[2]
+                inside = True
+                for a in range(3):
+                    one[0, a] = dx * axes[a, 0] + dy * axes[a, 1] + dz * axes[a, 2]
+                    inside &= abs(one[0, a]) <= half[a]
+                if not inside:
+                    continue
+                u = cell_index(one[0, 0], -half[0], 1.0 / wide_x, nx)
+                v = cell_index(one[0, 1], -half[1], 1.0 / wide_y, ny)
+                du = one[0, 0] + half[0] - (u + 0.5) * wide_x
+                dv = one[0, 1] + half[1] - (v + 0.5) * wide_y
+                d, b = du * du + dv * dv, v * nx + u
+                if d < best[b] or (d == best[b] and before(one, 0, kept, b)):
+                    best[b] = d
+                    kept[b] = one[0]
+    return kept[best < np.inf]
+
+
+@njit(cache=True)
+def box_fault(origin, axes, half):
+    """0 for a box; 1 for an origin that is not finite, 2 axes that are not orthonormal, 3 half sizes."""
+    for a in range(3):
+        if not abs(origin[a]) <= LIMIT:
+            return 1
+        for b in range(3):
+            dot = axes[a, 0] * axes[b, 0] + axes[a, 1] * axes[b, 1] + axes[a, 2] * axes[b, 2]
+            if not abs(dot - (a == b)) <= 1e-6:
+                return 2
+        if not 0.0 < half[a] <= LIMIT:
+            return 3
+    return 0
+
+
+@njit(cache=True)
+def ball_points(points, starts, levels, frame, centre, radius):
+    """The points within a radius, in a buffer, and their number: by cell, sorted in each."""
+    spans = np.empty((3, 2), np.int64)
+    for a in range(3):
+        reach = radius * (1.0 + 1e-14) + 1e-15 * abs(centre[a])
+        spans[a, 0], spans[a, 1] = _span(levels, frame, a, centre[a] - reach, centre[a] + reach)
+    total = 0
+    out = np.empty((0, 3))
+    m = 0
+    for fill in range(2):
+        for z in range(spans[2, 0], spans[2, 1] + 1):
+            for y in range(spans[1, 0], spans[1, 1] + 1):
+                row = (z * levels[0, 1] + y) * levels[0, 0]
+                if fill == 0:
+                    total += starts[row + spans[0, 1] + 1] - starts[row + spans[0, 0]]
+                    continue
+                for c in range(row + spans[0, 0], row + spans[0, 1] + 1):
+                    run = m
+                    for j in range(starts[c], starts[c + 1]):
+                        dx, dy, dz = (
+                            points[j, 0] - centre[0],
+                            points[j, 1] - centre[1],
+                            points[j, 2] - centre[2],
+                        )
+                        out[m] = points[j]
+                        m += dx * dx + dy * dy + dz * dz <= radius * radius
+                    _sort_rows(out, run, m)
+        if fill == 0:
+            out = np.empty((total, 3))
+    return out, m
