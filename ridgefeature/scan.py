@@ -16,8 +16,9 @@ MIN_POINTS = 16
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "km": 1e6, "in": 25.4, "ft": 304.8}
 """The length units a scan may have, and the millimetres in each."""
 
-# Points that leave a line by less than this part of their extent make no surface.
-LINE_TOLERANCE = 1e-6
+# Points that leave a line by less than this part of their extent make no surface. So small because
+# one wild point, such as a scanner's mark for "no echo", may stretch the extent a millionfold.
+LINE_TOLERANCE = 1e-9
 
 Array = NDArray[np.float64]
 
@@ -134,7 +135,7 @@ def _rows(points: Any) -> Array:
     if isinstance(points, (str, bytes)) or hasattr(points, "__fspath__"):
         raise ValueError(f"{wanted}; got the text {points!r}: read a file with read_scan(path)")
     if isinstance(points, np.ma.MaskedArray) and points.dtype.kind in "iuf":
-        points = points.astype(np.float64).filled(np.nan)
+        points = np.ma.filled(points.astype(np.float64), np.nan)
     try:
         array = np.asarray(points)
     except (ValueError, TypeError) as error:
