@@ -31,7 +31,7 @@ def greville(knots: ArrayLike, degree: int) -> Floats:
     k, _ = checked_knots(knots, degree)
     n = k.size - degree - 1
     windows = np.lib.stride_tricks.sliding_window_view(k[1:-1], degree)
-    return np.clip(windows.mean(axis=1), k[degree], k[n])  # a mean of equal knots may round outwards
+    return np.clip(np.mean(windows, axis=1), k[degree], k[n])  # a mean of equal knots may round outwards
 
 
 def basis_matrix(knots: ArrayLike, degree: int, at: ArrayLike, derivative: int = 0) -> Floats:
@@ -63,7 +63,8 @@ def interpolate(knots: ArrayLike, degree: int, values: ArrayLike) -> Floats:
             "sample at greville(knots, degree)"
         )
     matrix = basis_matrix(knots, degree, sites)
-    return np.linalg.solve(matrix, v.reshape(sites.size, -1)).reshape(v.shape)
+    poles = np.linalg.solve(matrix, v.reshape(sites.size, -1))
+    return np.asarray(poles, dtype=np.float64).reshape(v.shape)
 
 
 def local_basis(

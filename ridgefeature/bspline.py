@@ -224,7 +224,7 @@ class Surface:
         centre, size, samples = self._samples
         exact = (self.poles - centre, self.knots_u, self.knots_v, self.degree_u, self.degree_v)
         local = np.ascontiguousarray(p.reshape(-1, 3) - centre)
-        found = spline.project(local, exact, *self.closed, *starts, samples, 1e-8 * size)
+        found = spline.project(local, exact, self.closed, *starts, samples, 1e-8 * size)
         return found[:, 0].reshape(shape), found[:, 1].reshape(shape), found[:, 2].reshape(shape)
 
     @cached_property

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Spline = tuple[Floats, Floats, Floats, int, int]  # poles (nu, nv, 3), knots_u, knots_v, degree_u, degree_v
 
 
 @njit(cache=True)
-def _basis(knots, degree, n_poles, t, out):
+def _basis(knots: Floats, degree: int, n_poles: int, t: float, out: Floats) -> int:
     """Write values, first and second derivatives into out (3, degree + 1); return the first pole's index."""
     low, high = degree, n_poles  # knots[low] <= t <= knots[high]
     while high - low > 1:
@@ -37,8 +41,9 @@ def _basis(knots, degree, n_poles, t, out):
 
 
 @njit(cache=True)
-def _evaluate(poles, knots_u, knots_v, degree_u, degree_v, u, v, bu, bv, out):
+def _evaluate(surface: Spline, u: float, v: float, bu: Floats, bv: Floats, out: Floats) -> None:
     """Write S, Su, Sv, Suu, Suv, Svv into out (6, 3); bu (3, degree_u + 1) and bv are work space."""
+    poles, knots_u, knots_v, degree_u, degree_v = surface
     iu = _basis(knots_u, degree_u, poles.shape[0], u, bu)
     iv = _basis(knots_v, degree_v, poles.shape[1], v, bv)
     out[:, :] = 0.0
@@ -60,12 +65,14 @@ def _evaluate(poles, knots_u, knots_v, degree_u, degree_v, u, v, bu, bv, out):
 
 
 @njit(cache=True)
-def _dot(a, b):
+def _dot(a: Floats, b: Floats) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True)
-def _nearest_sample(x, y, z, samples, centres, radii):
+def _nearest_sample(
+    x: float, y: float, z: float, samples: Floats, centres: Floats, radii: Floats
+) -> tuple[int, int]:
     """(i, j) of the nearest of samples (m, k, 3); a block whose bounding sphere is too far is skipped."""
     first, bound = 0, np.inf
     for i in range(samples.shape[0]):
@@ -91,7 +98,7 @@ def _nearest_sample(x, y, z, samples, centres, radii):
 
 
 @njit(cache=True)
-def _direction(d, r, free_u, free_v):
+def _direction(d: Floats, r: Floats, free_u: bool, free_v: bool) -> tuple[float, float]:
     """Newton step (du, dv) of half the squared distance; Gauss-Newton where the Hessian is not positive."""
     gu, gv = -_dot(d[1], r), -_dot(d[2], r)
     euu, euv, evv = _dot(d[1], d[1]), _dot(d[1], d[2]), _dot(d[2], d[2])
@@ -117,7 +124,7 @@ def _direction(d, r, free_u, free_v):
 
 
 @njit(cache=True)
-def _into(t, low, high, closed):
+def _into(t: float, low: float, high: float, closed: bool) -> float:
     """t clipped to [low, high], or wrapped once around a closed direction."""
     if closed and (t < low or t > high):
         t = t + (high - low) if t < low else t - (high - low)
@@ -125,7 +132,7 @@ def _into(t, low, high, closed):
 
 
 @njit(cache=True)
-def _split(d, r):
+def _split(d: Floats, r: Floats) -> tuple[float, float]:
     """Length of r along the surface (0 at a foot point) and signed length of r along the normal Su x Sv."""
     nx = d[1, 1] * d[2, 2] - d[1, 2] * d[2, 1]
     ny = d[1, 2] * d[2, 0] - d[1, 0] * d[2, 2]
@@ -140,17 +147,28 @@ def _split(d, r):
 
 
 @njit(cache=True)
-def _load(p, surface, u, v, work, d, r):
+def _load(
+    p: Floats, surface: Spline, u: float, v: float, work: tuple[Floats, ...], d: Floats, r: Floats
+) -> float:
     """Evaluate into d and write the residual p - S into r; return its square."""
-    poles, knots_u, knots_v, degree_u, degree_v = surface
-    _evaluate(poles, knots_u, knots_v, degree_u, degree_v, u, v, work[0], work[1], d)
+    _evaluate(surface, u, v, work[0], work[1], d)
     for c in range(3):
         r[c] = p[c] - d[0, c]
     return _dot(r, r)
 
 
 @njit(cache=True)
-def _foot(p, u, v, surface, closed_u, closed_v, work, now, r, tolerance):
+def _foot(
+    p: Floats,
+    u: float,
+    v: float,
+    surface: Spline,
+    closed: tuple[bool, bool],
+    work: tuple[Floats, ...],
+    now: Floats,
+    r: Floats,
+    tolerance: float,
+) -> tuple[float, float]:
     """Walk from (u, v) to the foot point of p; now and r hold derivatives and residual there."""
     poles, knots_u, knots_v, degree_u, degree_v = surface
     u0, u1 = knots_u[degree_u], knots_u[poles.shape[0]]
@@ -159,15 +177,15 @@ def _foot(p, u, v, surface, closed_u, closed_v, work, now, r, tolerance):
     f = _load(p, surface, u, v, work, now, r)
     for _ in range(60):
         gu, gv = -_dot(now[1], r), -_dot(now[2], r)
-        free_u = closed_u or not ((u <= u0 and gu >= 0.0) or (u >= u1 and gu <= 0.0))
-        free_v = closed_v or not ((v <= v0 and gv >= 0.0) or (v >= v1 and gv <= 0.0))
+        free_u = closed[0] or not ((u <= u0 and gu >= 0.0) or (u >= u1 and gu <= 0.0))
+        free_v = closed[1] or not ((v <= v0 and gv >= 0.0) or (v >= v1 and gv <= 0.0))
         du, dv = _direction(now, r, free_u, free_v)
         slope = 2.0 * (gu * du + gv * dv)
         noise = 1e-13 * f + 1e-6 * tolerance * np.sqrt(f)
         size, moved = 1.0, False
         while size > 1e-4 and not moved:
-            nu = _into(u + size * du, u0, u1, closed_u)
-            nv = _into(v + size * dv, v0, v1, closed_v)
+            nu = _into(u + size * du, u0, u1, closed[0])
+            nv = _into(v + size * dv, v0, v1, closed[1])
             g = _load(p, surface, nu, nv, work, then, q)
             # a gain below the rounding of f cannot be seen: then the Newton step itself is trusted
             moved = g < f + 1e-4 * size * slope or -slope <= noise
@@ -184,7 +202,15 @@ def _foot(p, u, v, surface, closed_u, closed_v, work, now, r, tolerance):
 
 
 @njit(cache=True)
-def project(points, surface, closed_u, closed_v, start_u, start_v, samples, tolerance):
+def project(
+    points: Floats,
+    surface: Spline,
+    closed: tuple[bool, bool],
+    start_u: Floats,
+    start_v: Floats,
+    samples: tuple[Floats, ...],
+    tolerance: float,
+) -> Floats:
     """Foot points of points (n, 3): (n, 3) of u, v, signed distance; NaN where there is none.
 
     `surface` is (poles, knots_u, knots_v, degree_u, degree_v). Starts are start_u, start_v (n,) where finite,
@@ -204,7 +230,7 @@ def project(points, surface, closed_u, closed_v, start_u, start_v, samples, tole
         if not np.isfinite(u + v):
             i, j = _nearest_sample(p[0], p[1], p[2], blocks, centres, radii)
             u, v = samples_u[i, j], samples_v[i, j]
-        u, v = _foot(p, u, v, surface, closed_u, closed_v, work, now, r, tolerance)
+        u, v = _foot(p, u, v, surface, closed, work, now, r, tolerance)
         tangential, along = _split(now, r)
         if tangential <= tolerance:
             result[n, 0], result[n, 1], result[n, 2] = u, v, along

@@ -1,0 +1,37 @@
+"""Ridge features as CAD: exact faces and solids in CadQuery, and STEP files.
+
+Names are imported where they are first used: writing a STEP file needs OCP, but not all of cadquery.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cad_export.geometry import surface_of
+    from cad_export.shapes import face, solid
+    from cad_export.step_file import read_step, step
+
+__all__ = ["face", "read_step", "solid", "step", "surface_of"]
+
+# A module must not bear the name of a function here: importing it would replace the function.
+_HOME = {
+    "face": "shapes",
+    "read_step": "step_file",
+    "solid": "shapes",
+    "step": "step_file",
+    "surface_of": "geometry",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
