@@ -104,7 +104,8 @@ def guess(window: Window, pick: Array, extent: float, hints: Hints, section: Sec
         score = _score(fitted, pick)
         if best is None or score > best[0]:
             best = score, fitted
-    return None if best is None or best[0] <= 0 else best[1]
+    # The first frame was found by coarse search, so window and fit get one more round together.
+    return None if best is None or best[0] <= 0 else improve(window, best[1], settings)
 
 
 def _score(template: Template, pick: Array) -> float:

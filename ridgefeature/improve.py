@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import nlopt
 import numpy as np
@@ -26,8 +26,28 @@ _FREE = np.array([1, 2, 3, 4, 5, 6, 7])  # sliding along a straight ridge is not
 _BLOCK = np.ix_(_FREE, _FREE)
 _HUBER = (kernel.HUBER, 1.345)
 _ROUGH = 1e-2
-Bounds = tuple[float, float, float]
-"""Narrowest width, widest width, largest absolute height."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a fit may do to height and width: bounds, and what is expected with its reciprocal variances."""
+
+    narrowest: float
+    widest: float
+    lowest: float
+    highest: float
+    prior: Array
+
+
+def limits_of(height: float, width: float, settings: Settings) -> Limits:
+    """Limits about an expected height and width."""
+    change, drift = settings.width_change, settings.drift
+    high = height * settings.height_change
+    low = -high if settings.flips else 0.0
+    return Limits(
+        width / change, width * change, min(low, high), max(low, high),
+        np.array([height, width, (2 * drift * height) ** -2.0 if height else 0.0, (drift * width) ** -2.0]),
+    )
 
 
 def loss_of(settings: Settings) -> tuple[int, float]:
@@ -42,27 +62,29 @@ def _moved(template: Template, p: Array) -> Template:
 
 
 def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, float], tolerance: float,
-              bounds: Bounds, settings: Settings) -> tuple[Template, int, str]:
+              limits: Limits, settings: Settings) -> tuple[Template, int, str]:
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
     table, trend = template.section.table, template.trend
     h, w = template.height, template.width
     # A few hundred points are enough to precondition.
     some = points[:: max(len(points) // 300, 1)]
     normal = kernel.normal_matrix(some, h, w, trend, table, scale, *_HUBER)[0]
-    transform = kernel.whitening(normal / len(some))
+    normal /= len(some)
+    normal[6, 6] += limits.prior[2] / len(points)
+    normal[7, 7] += limits.prior[3] / len(points)
+    transform = kernel.whitening(normal)
     start = np.array([0, 0, 0, 0, 0, 0, h, w])
     number, tuning = loss
 
     def value(q: Array, gradient: Array) -> float:
-        return float(kernel.objective(q, gradient, transform, start, trend, points, table, scale, number, tuning))
+        return float(kernel.objective(q, gradient, transform, start, limits.prior, trend, points, table, scale, number, tuning))
 
     name = "LD_SLSQP" if settings.optimiser == "auto" else settings.optimiser
     optimiser = nlopt.opt(getattr(nlopt, name), 7)
     optimiser.set_min_objective(value)
-    narrowest, widest, tallest = bounds
     low, high = np.full(7, -np.inf), np.full(7, np.inf)
-    low[5], high[5] = (-tallest - h) / transform[6, 5], (tallest - h) / transform[6, 5]
-    low[6], high[6] = (narrowest - w) / transform[7, 6], (widest - w) / transform[7, 6]
+    low[5], high[5] = (limits.lowest - h) / transform[6, 5], (limits.highest - h) / transform[6, 5]
+    low[6], high[6] = (limits.narrowest - w) / transform[7, 6], (limits.widest - w) / transform[7, 6]
     optimiser.set_lower_bounds(np.minimum(low, 0.0))
     optimiser.set_upper_bounds(np.maximum(high, 0.0))
     optimiser.set_xtol_abs(tolerance)
@@ -84,9 +106,14 @@ def _scale(points: Array, template: Template) -> float:
     ))
 
 
-def _bounds(start: Template, settings: Settings) -> Bounds:
-    change = settings.width_change
-    return start.width / change, start.width * change, abs(start.height) * settings.height_change
+def start_loss(window: Window, start: Template, scale: float) -> float:
+    """Mean robust loss of a template as it stands; infinite where there are too few points."""
+    points = window(start)
+    if len(points) < FEWEST_POINTS:
+        return np.inf
+    scale = max(scale, LEAST_CONTRAST * abs(start.height))
+    r = kernel.residuals(points, start.height, start.width, start.trend, start.section.table)
+    return float(kernel.losses(r / scale, *_HUBER).mean())
 
 
 def improve(window: Window, start: Template, settings: Settings) -> Template:
@@ -97,19 +124,19 @@ def improve(window: Window, start: Template, settings: Settings) -> Template:
     points = window(start)
     if len(points) < FEWEST_POINTS:
         return replace(start, status="no data", points=len(points), std=None)
-    bounds = _bounds(start, settings)
+    limits = limits_of(start.height, start.width, settings)
     template, evaluations, _ = _minimise(
-        points, start, _scale(points, start), _HUBER, _ROUGH, bounds, settings
+        points, start, _scale(points, start), _HUBER, _ROUGH, limits, settings
     )
-    return _rounds(window, template, bounds, _ROUGH, 0.1, evaluations, settings)
+    return _rounds(window, template, limits, _ROUGH, 0.1, evaluations, settings)
 
 
-def refine(window: Window, start: Template, settings: Settings) -> Template:
+def refine(window: Window, start: Template, limits: Limits, settings: Settings) -> Template:
     """Fit one template to the last digit, from a start near the optimum; never raises for not converging."""
-    return _rounds(window, start, _bounds(start, settings), settings.tolerance, 0.02, 0, settings)
+    return _rounds(window, start, limits, settings.tolerance, 0.02, 0, settings)
 
 
-def _rounds(window: Window, template: Template, bounds: Bounds, tolerance: float, agree: float, evaluations: int,
+def _rounds(window: Window, template: Template, limits: Limits, tolerance: float, agree: float, evaluations: int,
             settings: Settings) -> Template:
     loss = loss_of(settings)
     for _ in range(4):
@@ -118,7 +145,7 @@ def _rounds(window: Window, template: Template, bounds: Bounds, tolerance: float
         if len(points) < FEWEST_POINTS:
             return replace(template, status="no data", points=len(points), std=None)
         scale = _scale(points, template)
-        template, n, status = _minimise(points, template, scale, loss, tolerance, bounds, settings)
+        template, n, status = _minimise(points, template, scale, loss, tolerance, limits, settings)
         evaluations += n
         if abs(template.width / before - 1) < agree:
             break

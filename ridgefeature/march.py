@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import FEWEST_POINTS, improve
+from ridgefeature.improve import FEWEST_POINTS, improve, start_loss
 from ridgefeature.kernels.residual import rotation_of
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -18,6 +19,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
+_LARGEST_START = 0.5
+_WORSE = 1.5
+"""A fit whose noise is this many times that of the template before it is suspect."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -40,38 +44,74 @@ def reverse(template: Template) -> Template:
 
 def turn_between(first: Template, second: Template) -> Array:
     """Rotation vector, in the first frame, that takes the first frame to the second."""
-    r = first.rotation.T @ second.rotation
+    return _rotation_vector(first.rotation.T @ second.rotation)
+
+
+def _rotation_vector(r: Array) -> Array:
     axis = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    sine = np.linalg.norm(axis)
-    angle = np.arctan2(sine, 0.5 * (np.trace(r) - 1))
+    sine = math.sqrt(axis @ axis)
+    angle = math.atan2(sine, 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1))
     return axis * (angle / sine if sine > 1e-12 else 1.0)
 
 
-def _rotation(vector: Array) -> Array:
-    return rotation_of(vector)[0]
+def append(chain: list[Template], settings: Settings) -> list[Template]:
+    """Starts of the next template, one for each way the ridge may go on.
 
-
-def append(last: Template, before: Template | None, settings: Settings) -> Template:
-    """Start of the next template: its first row lies on the last row of `last`.
-
-    It keeps width and height and goes on turning as the two templates before it did.
+    The first row lies on the last row of the last template of the chain; width and height are kept; the base is
+    that of the last three together. The ridge goes on turning as the last three centres do, or straight on, along
+    the chord of the last two centres or along the last template's own direction, whatever the data then favour: a
+    chord is known better, but lags at a kink.
     """
-    length = settings.length * last.width
-    rotation, joint = last.rotation, last.end
-    if before is not None:
-        turn = turn_between(before, last)
-        step = np.linalg.norm(last.position - before.position)
-        share = min(0.5 * (last.length + length) / step, 1.2) if step > 0 else 0.0
-        turn = turn * share
-        size = np.linalg.norm(turn)
-        if size > 0.5:
-            turn *= 0.5 / size
-        joint = last.position + 0.5 * last.length * (last.rotation @ _rotation(0.25 * turn))[:, 0]
-        rotation = last.rotation @ _rotation(turn)
-    return replace(
-        last, position=joint + 0.5 * length * rotation[:, 0], rotation=rotation, length=length,
-        flank=settings.flank * last.width, trend=np.zeros(3), std=None, evidence=0.0, status="start",
-    )
+    last = chain[-1]
+    length = settings.length * last.width * _stretch(last, settings)
+    normal = sum((t.rotation[:, 2] for t in chain[-3:]), np.zeros(3))
+    normal /= math.sqrt(normal @ normal)
+    own = last.rotation[:, 0]
+    ways = [(own, 0.0)]
+    if len(chain) > 1:
+        chord = last.position - chain[-2].position
+        step = math.sqrt(chord @ chord)
+        if len(chain) > 2:
+            before = chain[-2].position - chain[-3].position
+            angle = math.atan2(normal @ np.cross(before, chord), before @ chord)
+            per_length = 2 * angle / (step + math.sqrt(before @ before))
+            ways = [(_turned(chord, normal, 0.5 * step * per_length), per_length), (own, per_length), (own, 0.0)]
+        else:
+            ways.append((chord, 0.0))
+    starts = []
+    for direction, per_length in ways:
+        frame = _facing(normal, direction)
+        half = 0.25 * (last.length + length) * per_length
+        half = max(-_LARGEST_START, min(_LARGEST_START, half))
+        joint = last.position + 0.5 * last.length * _turned(frame[:, 0], normal, 0.5 * half)
+        frame = _facing(normal, _turned(frame[:, 0], normal, 2 * half))
+        starts.append(replace(
+            last, position=joint + 0.5 * length * frame[:, 0], rotation=frame, length=length,
+            flank=settings.flank * last.width, trend=np.zeros(3), std=None, evidence=0.0, status="start",
+        ))
+    return starts
+
+
+def _turned(direction: Array, normal: Array, angle: float) -> Array:
+    """A direction turned about the normal (Rodrigues)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return c * direction + s * np.cross(normal, direction) + (1 - c) * (normal @ direction) * normal
+
+
+def _facing(normal: Array, direction: Array) -> Array:
+    """The frame with this normal that faces along the direction, as far as the base allows."""
+    x = direction - normal * (direction @ normal)
+    x /= math.sqrt(x @ x)
+    return np.column_stack([x, np.cross(normal, x), normal])
+
+
+def _stretch(last: Template, settings: Settings) -> float:
+    """How much longer than usual a template must be to tell its width well, judged by the one before it."""
+    if last.points == 0 or last.height == 0:
+        return 1.0
+    usual = last.points * settings.length * last.width / last.length
+    width_error = 3.8 * last.scale / (abs(last.height) * np.sqrt(usual))
+    return float(np.clip((width_error / settings.wanted_error) ** 2, 1.0, settings.longest))
 
 
 def _reject(fitted: Template, start: Template, settings: Settings) -> str:
@@ -103,40 +143,47 @@ def _meets(template: Template, others: list[Template]) -> bool:
     return False
 
 
-def _fit_next(rough: Window, full: Window, start: Template, settings: Settings) -> tuple[Template, str]:
-    """The next template and why it is none; a rejected one is tried again with all points of its window."""
-    fitted = improve(rough, start, settings)
-    why = _reject(fitted, start, settings)
-    if why and fitted.points >= FEWEST_POINTS:
-        again = improve(full, start, settings)
-        why_again = _reject(again, start, settings)
-        if not why_again:
-            return again, ""
-    return fitted, why
+def _fit_next(rough: Window, full: Window, chain: list[Template], settings: Settings
+              ) -> tuple[Template, Template, str]:
+    """Start and fit of the next template, and why it is none.
 
-
-def march_one_way(rough: Window, full: Window, chain: list[Template], found: list[Template], settings: Settings,
-                  progress: Progress | None = None) -> str:
-    """Append the templates that follow `chain` to `found`, and tell why the march stopped.
-
-    chain: what is known so far, in the direction of the march; not changed.
+    The start that the data favour is fitted. Where that is rejected, or fits much worse than the template before,
+    the other starts are tried, and last all points of the window instead of some; the best fit is kept.
     """
-    last, before = chain[-1], chain[-2] if len(chain) > 1 else None
-    reason, pending = "", 0
-    while len(chain) + len(found) < settings.max_templates:
-        start = append(last, before, settings)
-        fitted, why = _fit_next(rough, full, start, settings)
+    starts = append(chain, settings)
+    starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
+    best: tuple[Template, Template, str] | None = None
+    for start, window in [*((s, rough) for s in starts), (starts[0], full)]:
+        fitted = improve(window, start, settings)
+        why = _reject(fitted, start, settings)
+        if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
+            best = start, fitted, why
+        if fitted.status == "no data" or (not why and fitted.scale < _WORSE * chain[-1].scale):
+            break
+    return best  # type: ignore[return-value]
+
+
+def march_one_way(rough: Window, full: Window, known: list[Template], found: list[Template], settings: Settings,
+                  progress: Progress | None = None) -> str:
+    """Append the templates that follow `known` to `found`, and tell why the march stopped.
+
+    known: what is known so far, in the direction of the march; not changed.
+    """
+    chain, reason, skipped = list(known), "", 0.0
+    while len(known) + len(found) < settings.max_templates:
+        start, fitted, why = _fit_next(rough, full, chain, settings)
         if why:
-            reason, pending = reason or why, pending + 1
-            if pending > settings.look_ahead:
+            reason = reason or why
+            skipped += start.length
+            if skipped > settings.look_ahead * start.width:
                 return reason
-            before, last = None, start
+            chain.append(start)
             continue
-        if _meets(fitted, [*chain, *found][:-2]):
-            return "it ran back into itself"
-        reason, pending = "", 0
+        if _meets(fitted, [*known, *found][:-2]):
+            return reason or "it ran back into itself"
+        reason, skipped = "", 0.0
         found.append(fitted)
-        last, before = fitted, last
+        chain.append(fitted)
         if progress is not None:
             progress(fitted)
     return f"max_templates ({settings.max_templates}) reached"
@@ -144,9 +191,7 @@ def march_one_way(rough: Window, full: Window, chain: list[Template], found: lis
 
 def march(rough: Window, full: Window, first: Template, settings: Settings, progress: Progress | None = None) -> Track:
     """March both ways from the first template; an interrupt ends it and keeps what is there."""
-    settings = replace(
-        settings, width_change=settings.march_width_change, height_change=settings.march_height_change
-    )
+    settings = settings.marching()
     ahead: list[Template] = []
     back: list[Template] = []
     why_ahead = why_back = INTERRUPTED

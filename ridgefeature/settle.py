@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import FEWEST_POINTS, judge, loss_of, refine
+from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_of, refine
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.march import Track, reverse, turn_between
 from ridgefeature.section import Section
@@ -109,13 +109,17 @@ def place_ends(window: Window, track: Track, settings: Settings) -> Track:
     return Track(tuple(reversed(templates)), track.stop)
 
 
+def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:
+    """Limits of the i-th template about the mean of its neighbours."""
+    near = [templates[k] for k in (i - 1, i + 1) if 0 <= k < len(templates)] or [templates[i]]
+    return limits_of(float(np.mean([t.height for t in near])), float(np.mean([t.width for t in near])), settings)
+
+
 def settle(window: Window, track: Track, section: Section, settings: Settings) -> Track:
     """Refit every template with the trend of its neighbours and the given section."""
     known = trends([replace(t, section=section) for t in track.templates])
-    settings = replace(
-        settings, width_change=settings.march_width_change, height_change=settings.march_height_change
-    )
-    fitted = [refine(window, t, settings) for t in known]
+    settings = settings.marching()
+    fitted = [refine(window, t, _expected(known, i, settings), settings) for i, t in enumerate(known)]
     kept = [old if new.status in ("failed", "no data") else new for new, old in zip(fitted, known, strict=True)]
     return Track(tuple(judge(window, t, settings) for t in kept), track.stop)
 
