@@ -144,7 +144,7 @@ def typical_spacing(grid: Grid, probes: int = 256) -> float:
 def as_points(points: npt.ArrayLike) -> Floats:
     """A read-only (n, 3) float64 view, or copy where needed. Raises ValueError unless (n, 3) real, n >= 1."""
     try:
-        rows = np.require(points, np.float64, ["C", "A"])
+        rows = _plain(points)
     except (TypeError, ValueError) as error:
         raise ValueError(
             f"expected points as an (n, 3) array of numbers, got {type(points).__name__}"
@@ -155,35 +155,40 @@ def as_points(points: npt.ArrayLike) -> Floats:
         )
     if not 1 <= len(rows) < 2**31:
         raise ValueError(f"expected between 1 and 2^31 - 1 points, got {len(rows)}")
-    return _fixed(rows)
+    return rows
 
 
 def _search(grid: Grid, queries: npt.ArrayLike, k: int) -> tuple[Floats, npt.NDArray[np.int64]]:
     if not 1 <= k <= len(grid.points):
         raise ValueError(f"expected 1 <= k <= {len(grid.points)}, the number of points, got k = {k}")
-    asked = np.require(queries, np.float64, ["C", "A"])
+    asked = _plain(queries)
     if asked.ndim != 2 or asked.shape[1] != 3:
         raise ValueError(f"expected queries as an (m, 3) array, got shape {asked.shape}")
     best = np.empty((len(asked), k))
     rows = np.empty((len(asked), k), np.int64)
     if not nearest_kernels.search(
-        grid.points, grid.starts, grid.tree, grid.levels, grid.frame, _fixed(asked), best, rows
+        grid.points, grid.starts, grid.tree, grid.levels, grid.frame, asked, best, rows
     ):
         raise ValueError("expected finite queries, got NaN or infinite coordinates; remove such rows first")
     return best, rows
 
 
 def _vector(values: npt.ArrayLike, shape: tuple[int, ...]) -> Floats:
-    array = np.require(values, np.float64, ["C", "A"])
+    array = _plain(values)
     if array.shape != shape:
         raise ValueError(f"expected an array of shape {shape}, got shape {array.shape}")
-    return _fixed(array)
+    return array
+
+
+def _plain(values: npt.ArrayLike) -> Floats:
+    array = np.ascontiguousarray(values, np.float64)
+    return _fixed(array if array.flags.aligned else array.copy())
 
 
 def _fixed(array: A) -> A:
     """A read-only view: the kernels are compiled once, for read-only input, whatever the caller has."""
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)
     return view
 
 
@@ -204,7 +209,8 @@ def _choose_cells(points: Floats, box: Floats) -> tuple[Levels, Floats]:
         kernels.count_cells(points, levels, frame, counts)
         block = counts.reshape(levels[0, 2::-1])
         profiles = [block.sum(axis=axes, dtype=np.int64) for axes in ((0, 1), (0, 2), (1, 2))]
-        narrowed = _narrow(profiles, n // STRAYS, size, low, high)
+        narrowed = _narrow(profiles, n // STRAYS, size, low, high, 1 / 3)
+    _narrow(profiles, n // STRAYS, size, low, high, 1.0)
     crowd = float(np.dot(counts, counts.astype(np.int64)) - n) / n
     sizes = np.full(3, size * (CROWD / crowd) ** 0.5 if crowd > 0.0 else size)
     limit = max(n, 64)
@@ -215,16 +221,14 @@ def _choose_cells(points: Floats, box: Floats) -> tuple[Levels, Floats]:
     return _layout(low, high, sizes, box)
 
 
-def _narrow(
-    profiles: list[npt.NDArray[np.int64]], spare: int, size: float, low: Floats, high: Floats
-) -> bool:
-    """Narrow low and high, in place, to all but `spare` points a side, where that leaves a third or less."""
+def _narrow(profiles: list[Levels], spare: int, size: float, low: Floats, high: Floats, share: float) -> bool:
+    """Narrow low and high, in place, to all but `spare` points a side, where that leaves `share` or less."""
     narrowed = False
     for axis, profile in enumerate(profiles):
         below = profile.cumsum()
         first = max(int(np.searchsorted(below, spare, side="right")) - 1, 0)
         last = min(int(np.searchsorted(below, below[-1] - spare, side="left")) + 1, len(below) - 1)
-        if 3 * (last + 1 - first) <= len(below):
+        if last + 1 - first <= share * len(below):
             low[axis], high[axis] = low[axis] + first * size, min(high[axis], low[axis] + (last + 1) * size)
             narrowed = True
     return narrowed

@@ -69,7 +69,7 @@ def count_cells(points, levels, frame, counts):
 
 @njit(cache=True)
 def sort_into_cells(points, levels, frame, starts, out):
-    """Counting sort. `starts` comes with counts, 0 at its end, and leaves with the first row of every cell"""
+    """Counting sort. `starts` comes with counts, 0 at its end, and leaves with the first row of each cell."""
     total = 0
     for c in range(starts.shape[0]):
         total += starts[c]
