@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import improve
+from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.search import best_straight_ridge
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -104,8 +104,10 @@ def guess(window: Window, pick: Array, extent: float, hints: Hints, section: Sec
         score = _score(fitted, pick)
         if best is None or score > best[0]:
             best = score, fitted
-    # The first frame was found by coarse search, so window and fit get one more round together.
-    return None if best is None or best[0] <= 0 else improve(window, best[1], settings)
+    if best is None or best[0] <= 0:
+        return None
+    # The length still is that of the start's width, so window and fit get one more round together.
+    return improve(window, sized(best[1], settings), settings)
 
 
 def _score(template: Template, pick: Array) -> float:

@@ -15,6 +15,9 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 FEWEST_POINTS = 12
+_LEAN = (0.2, 0.2, 0.35)
+"""Expected turn of a fit about its own x, y, z in radians: wide enough for any bend, narrow enough to hold on to
+the ridge where the data are poor."""
 SMALLEST_SCALE = 5e-3
 """Noise scale in parts of the height below which residuals are the model's own: no point is an outlier there."""
 
@@ -37,6 +40,7 @@ class Limits:
     lowest: float
     highest: float
     prior: Array
+    """(2, 8) expected increments, height and width, and their reciprocal variances."""
 
 
 def limits_of(height: float, width: float, settings: Settings) -> Limits:
@@ -44,9 +48,11 @@ def limits_of(height: float, width: float, settings: Settings) -> Limits:
     change, drift = settings.width_change, settings.drift
     high = height * settings.height_change
     low = -high if settings.flips else 0.0
+    size = abs(height) + 0.1 * width
+    deviation = np.array([width, 0.25 * width, 0.5 * size, *_LEAN, 2 * drift * size, drift * width])
     return Limits(
         width / change, width * change, min(low, high), max(low, high),
-        np.array([height, width, (2 * drift * height) ** -2.0 if height else 0.0, (drift * width) ** -2.0]),
+        np.array([[0, 0, 0, 0, 0, 0, height, width], deviation**-2.0]),
     )
 
 
@@ -70,8 +76,7 @@ def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, 
     some = points[:: max(len(points) // 300, 1)]
     normal = kernel.normal_matrix(some, h, w, trend, table, scale, *_HUBER)[0]
     normal /= len(some)
-    normal[6, 6] += limits.prior[2] / len(points)
-    normal[7, 7] += limits.prior[3] / len(points)
+    normal += np.diag(limits.prior[1] / len(points))
     transform = kernel.whitening(normal)
     start = np.array([0, 0, 0, 0, 0, 0, h, w])
     number, tuning = loss
@@ -104,6 +109,16 @@ def _scale(points: Array, template: Template) -> float:
     return float(kernel.robust_scale(
         points, template.height, template.width, template.trend, template.section.table, floor
     ))
+
+
+def sized(template: Template, settings: Settings) -> Template:
+    """The template as long as its width asks for, and longer where the data tell the width poorly."""
+    length = settings.length * template.width
+    if template.points and template.height:
+        usual = template.points * length / template.length
+        width_error = 3.8 * template.scale / (abs(template.height) * np.sqrt(usual))
+        length *= float(np.clip((width_error / settings.wanted_error) ** 2, 1.0, settings.longest))
+    return replace(template, length=length, flank=settings.flank * template.width)
 
 
 def start_loss(window: Window, start: Template, scale: float) -> float:

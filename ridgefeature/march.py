@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import FEWEST_POINTS, improve, start_loss
+from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
 from ridgefeature.kernels.residual import rotation_of
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -63,7 +63,7 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
     chord is known better, but lags at a kink.
     """
     last = chain[-1]
-    length = settings.length * last.width * _stretch(last, settings)
+    length = sized(last, settings).length
     normal = sum((t.rotation[:, 2] for t in chain[-3:]), np.zeros(3))
     normal /= math.sqrt(normal @ normal)
     own = last.rotation[:, 0]
@@ -105,20 +105,11 @@ def _facing(normal: Array, direction: Array) -> Array:
     return np.column_stack([x, np.cross(normal, x), normal])
 
 
-def _stretch(last: Template, settings: Settings) -> float:
-    """How much longer than usual a template must be to tell its width well, judged by the one before it."""
-    if last.points == 0 or last.height == 0:
-        return 1.0
-    usual = last.points * settings.length * last.width / last.length
-    width_error = 3.8 * last.scale / (abs(last.height) * np.sqrt(usual))
-    return float(np.clip((width_error / settings.wanted_error) ** 2, 1.0, settings.longest))
-
-
 def _reject(fitted: Template, start: Template, settings: Settings) -> str:
     """Why a fitted template is no continuation of its start; empty if it is one."""
     if fitted.points < FEWEST_POINTS or fitted.status == "no data":
         return "the data end here"
-    if fitted.evidence < settings.evidence:
+    if fitted.evidence < settings.going_on:
         return "no ridge: the data agree with a flat base"
     if fitted.height * start.height <= 0 or abs(fitted.height) > 2.5 * abs(start.height):
         return "no ridge: the height jumped"

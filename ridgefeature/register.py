@@ -17,7 +17,7 @@ from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.section import bell
 from ridgefeature.settings import Settings
-from ridgefeature.settle import choose_section, place_ends, settle
+from ridgefeature.settle import choose_section, place_ends, prune, settle
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -88,7 +88,7 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
         )
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
-    track = settle(full, track, bell(), settings)
+    track = prune(full, settle(full, track, bell(), settings), settings)
     section = choose_section(full, track, settings)
     return track if section is track.templates[0].section else settle(full, track, section, settings)
 

@@ -124,6 +124,24 @@ def settle(window: Window, track: Track, section: Section, settings: Settings) -
     return Track(tuple(judge(window, t, settings) for t in kept), track.stop)
 
 
+def prune(window: Window, track: Track, settings: Settings) -> Track:
+    """The track without end templates that, once refitted, are no ridge; the new ends are placed again."""
+    templates = list(track.templates)
+    while len(templates) > 1 and not _stands(templates[-1], settings):
+        templates.pop()
+    while len(templates) > 1 and not _stands(templates[0], settings):
+        templates.pop(0)
+    if len(templates) == len(track.templates):
+        return track
+    return settle(window, place_ends(window, Track(tuple(templates), track.stop), settings), templates[0].section, settings)
+
+
+def _stands(template: Template, settings: Settings) -> bool:
+    return template.evidence >= settings.going_on and template.status != "no data" and bool(
+        template.std is not None and np.isfinite(template.std).all()
+    )
+
+
 def choose_section(window: Window, track: Track, settings: Settings) -> Section:
     """The section that the ridge's points agree with best."""
     return track.templates[0].section

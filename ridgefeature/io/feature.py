@@ -57,7 +57,9 @@ def from_document(document: Any) -> Ridge:
             "read it with the release that wrote it, or update ridgefeature"
         )
     try:
-        section = Section(np.array(document["section"]["coefficients"], dtype=np.float64), document["section"]["name"])
+        section = Section(
+            np.array(document["section"]["coefficients"], dtype=np.float64), document["section"]["name"]
+        )
         stations = {f.name: _array(document["stations"][f.name]) for f in fields(Stations)}
         ridge = Ridge(
             **stations,
@@ -71,7 +73,9 @@ def from_document(document: Any) -> Ridge:
             source=None if document["source"] is None else Source(**document["source"]),
         )
     except (KeyError, TypeError, IndexError, AttributeError) as error:
-        raise ValueError(f"expected a whole ridge feature, got one with {error!r} missing or wrong; save it again") from error
+        raise ValueError(
+            f"expected a whole ridge feature, got one with {error!r} missing or wrong; save it again"
+        ) from error
     _check_shapes(ridge)
     return ridge
 
@@ -101,7 +105,9 @@ def load(path: str | os.PathLike[str]) -> Ridge:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: expected a ridge feature as JSON, got a file that is damaged or cut short ({error})") from error
+        raise ValueError(
+            f"{path}: expected a ridge feature as JSON, got a file that is damaged or cut short ({error})"
+        ) from error
     try:
         return from_document(document)
     except ValueError as error:
@@ -142,9 +148,15 @@ def _template(document: dict[str, Any], section: Section) -> Template:
     for name in ("position", "rotation", "trend"):
         values[name] = _array(values[name])
     values["std"] = None if values["std"] is None else _array(values["std"])
-    return Template(section=section, **{k: _number(v) if k != "status" else v for k, v in values.items()
-                                        if k not in ("position", "rotation", "trend", "std")},
-                    **{k: values[k] for k in ("position", "rotation", "trend", "std")})
+    return Template(
+        section=section,
+        **{
+            k: _number(v) if k != "status" else v
+            for k, v in values.items()
+            if k not in ("position", "rotation", "trend", "std")
+        },
+        **{k: values[k] for k in ("position", "rotation", "trend", "std")},
+    )
 
 
 def _check_shapes(ridge: Ridge) -> None:
@@ -152,5 +164,12 @@ def _check_shapes(ridge: Ridge) -> None:
     for f in fields(Stations):
         want = (*k, 3) if f.name in ("spine", "tangent", "normal") else k
         array = getattr(ridge, f.name)
-        if array.ndim == 0 or array.shape != want or len(array) < 5 or not (np.isfinite(array).all() or f.name.endswith("_std")):
-            raise ValueError(f"expected {f.name} of shape {want} and finite, got shape {array.shape}; save the feature again")
+        if (
+            array.ndim == 0
+            or array.shape != want
+            or len(array) < 5
+            or not (np.isfinite(array).all() or f.name.endswith("_std"))
+        ):
+            raise ValueError(
+                f"expected {f.name} of shape {want} and finite, got shape {array.shape}; save the feature again"
+            )

@@ -204,8 +204,8 @@ def rotation_of(vector):
 def objective(q, gradient, transform, start, prior, trend, points, table, scale, loss, tuning):
     """Mean robust loss at parameters start + transform @ q; its gradient in q is written to `gradient`.
 
-    points (n, 3) in the start frame; start (8,); transform (8, m); q (m,). prior (4,): expected height and width,
-    and the reciprocal variances of both; it counts once, whatever the number of points.
+    points (n, 3) in the start frame; start (8,); transform (8, m); q (m,). prior (2, 8): expected parameters and
+    their reciprocal variances; it counts once, whatever the number of points.
     """
     p = start.copy()
     for i in range(8):
@@ -239,15 +239,17 @@ def objective(q, gradient, transform, start, prior, trend, points, table, scale,
         for i in range(3):
             full[i] = -(rotation[i, 0] * g_x + rotation[i, 1] * g_y + rotation[i, 2] * g_z)
             full[3 + i] = jacobian[0, i] * c_x + jacobian[1, i] * c_y + jacobian[2, i] * c_z
-        full[6] = g_h + scale * prior[2] * (height - prior[0])
-        full[7] = g_w + scale * prior[3] * (width - prior[1])
+        full[6], full[7] = g_h, g_w
+        for i in range(8):
+            full[i] += scale * prior[1, i] * (p[i] - prior[0, i])
         norm = 1.0 / (scale * points.shape[0])
         for j in range(q.size):
             s = 0.0
             for i in range(8):
                 s += transform[i, j] * full[i]
             gradient[j] = s * norm
-    total += 0.5 * (prior[2] * (height - prior[0]) ** 2 + prior[3] * (width - prior[1]) ** 2)
+    for i in range(8):
+        total += 0.5 * prior[1, i] * (p[i] - prior[0, i]) ** 2
     return total / points.shape[0]
 
 
