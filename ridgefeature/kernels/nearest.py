@@ -8,7 +8,7 @@ from .grid import LIMIT, before, cell_index
 FEW_CELLS = 64  # up to so many cells are looked through one by one; beyond, the tree is descended
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")  # a third of the time of a query otherwise
 def _visit(points, first, last, query, best, rows, i):
     """Put points[first:last] among the k best of query i. Equal distances go by coordinates, never by row."""
     x, y, z = query
@@ -127,8 +127,9 @@ def search(points, starts, tree, levels, frame, queries, best, rows):
         query = (qx, qy, qz)
         if not (abs(qx) <= LIMIT and abs(qy) <= LIMIT and abs(qz) <= LIMIT):
             return False
-        best[i, :] = np.inf
-        rows[i, :] = -1
+        for s in range(k):
+            best[i, s] = np.inf
+            rows[i, s] = -1
         x = cell_index(qx, frame[0], frame[6], nx)
         y = cell_index(qy, frame[1], frame[7], ny)
         z = cell_index(qz, frame[2], frame[8], nz)
@@ -152,5 +153,6 @@ def search(points, starts, tree, levels, frame, queries, best, rows):
             _visit_block(points, starts, levels, block, done, query, best, rows, i)
         else:
             _descend(points, starts, tree, levels, frame, done, query, best, rows, i, stack, gaps)
-        best[i, :] = np.sqrt(best[i, :])
+        for s in range(k):
+            best[i, s] = np.sqrt(best[i, s])
     return True
