@@ -7,7 +7,7 @@
 from ridgefeature.bspline import Surface
 from ridgefeature.distance import directed_hausdorff, hausdorff, mean_directed_hausdorff
 from ridgefeature.io import load, read_scan
-from ridgefeature.register import NoRidgeError, register
+from ridgefeature.registration import NoRidgeError, register
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
 from ridgefeature.section import Section

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.kernels import residual as kernel
+from ridgefeature.kernels.algebra import moved
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -25,10 +26,10 @@ LEAST_CONTRAST = 0.05
 """Noise scale in parts of the height that evidence assumes at least, so that misfit of the model does not count."""
 
 _LOSS = {"huber": kernel.HUBER, "tukey": kernel.TUKEY, "square": kernel.SQUARE, "cauchy": kernel.CAUCHY}
-_FREE = np.array([1, 2, 3, 4, 5, 6, 7])  # sliding along a straight ridge is not observable
-_BLOCK = np.ix_(_FREE, _FREE)
 _HUBER = (kernel.HUBER, 1.345)
 _ROUGH = 1e-2
+_AGREE = 0.1
+_FEW_OUTLIERS = 0.02
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def loss_of(settings: Settings) -> tuple[int, float]:
 
 def _moved(template: Template, p: Array) -> Template:
     """The template after increments p (8,) in its own frame."""
-    position, rotation = kernel.moved(template.position, template.rotation, p)
+    position, rotation = moved(template.position, template.rotation, p)
     return replace(template, position=position, rotation=rotation, height=float(p[6]), width=float(p[7]))
 
 
@@ -72,12 +73,7 @@ def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, 
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
     table, trend = template.section.table, template.trend
     h, w = template.height, template.width
-    # A few hundred points are enough to precondition.
-    some = points[:: max(len(points) // 300, 1)]
-    normal = kernel.normal_matrix(some, h, w, trend, table, scale, *_HUBER)[0]
-    normal /= len(some)
-    normal += np.diag(limits.prior[1] / len(points))
-    transform = kernel.whitening(normal)
+    transform = kernel.precondition(points, h, w, trend, table, scale, limits.prior[1])
     start = np.array([0, 0, 0, 0, 0, 0, h, w])
     number, tuning = loss
 
@@ -127,23 +123,33 @@ def start_loss(window: Window, start: Template, scale: float) -> float:
     if len(points) < FEWEST_POINTS:
         return np.inf
     scale = max(scale, LEAST_CONTRAST * abs(start.height))
-    r = kernel.residuals(points, start.height, start.width, start.trend, start.section.table)
-    return float(kernel.losses(r / scale, *_HUBER).mean())
+    return float(kernel.mean_loss(
+        points, start.height, start.width, start.trend, start.section.table, scale, *_HUBER
+    )[0])
 
 
 def improve(window: Window, start: Template, settings: Settings) -> Template:
     """Fit one template roughly, from a start that may be far off; never raises for not converging.
 
-    Huber's loss first, then the chosen loss on the window of the result, until window and width agree.
+    Huber's loss first; where outliers are seen, or the width changed much, the chosen loss on the window of the
+    result, until window and width agree.
     """
     points = window(start)
     if len(points) < FEWEST_POINTS:
         return replace(start, status="no data", points=len(points), std=None)
     limits = limits_of(start.height, start.width, settings)
-    template, evaluations, _ = _minimise(
+    template, evaluations, status = _minimise(
         points, start, _scale(points, start), _HUBER, _ROUGH, limits, settings
     )
-    return _rounds(window, template, limits, _ROUGH, 0.1, evaluations, settings)
+    points = window(template)
+    if len(points) >= FEWEST_POINTS and abs(template.width / start.width - 1) < _AGREE:
+        scale = _scale(points, template)
+        _, far = kernel.mean_loss(
+            points, template.height, template.width, template.trend, template.section.table, scale, *_HUBER
+        )
+        if far < _FEW_OUTLIERS:
+            return _noted(points, template, scale, evaluations, status, settings)
+    return _rounds(window, template, limits, _ROUGH, _AGREE, evaluations, settings)
 
 
 def refine(window: Window, start: Template, limits: Limits, settings: Settings) -> Template:
@@ -164,34 +170,27 @@ def _rounds(window: Window, template: Template, limits: Limits, tolerance: float
         evaluations += n
         if abs(template.width / before - 1) < agree:
             break
-    return replace(
-        template, scale=scale, evaluations=evaluations, status=status, points=len(points),
-        evidence=_evidence(points, template, scale, settings),
+    return _noted(points, template, scale, evaluations, status, settings)
+
+
+def _noted(points: Array, template: Template, scale: float, evaluations: int, status: str, settings: Settings
+           ) -> Template:
+    """The template with what its fit said. Misfit of a few per cent of the height is no evidence."""
+    contrast = max(scale, LEAST_CONTRAST * abs(template.height))
+    evidence = kernel.evidence(
+        points, template.height, template.width, template.trend, template.section.table, contrast,
+        *loss_of(settings),
     )
-
-
-def _evidence(points: Array, template: Template, scale: float, settings: Settings) -> float:
-    """Twice the log likelihood ratio of ridge against plane; misfit of a few per cent of the height is no evidence."""
-    scale = max(scale, LEAST_CONTRAST * abs(template.height))
-    return float(kernel.evidence(
-        points, template.height, template.width, template.trend, template.section.table, scale, *loss_of(settings)
-    ))
+    return replace(
+        template, scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=float(evidence)
+    )
 
 
 def judge(window: Window, template: Template, settings: Settings) -> Template:
     """The template with standard deviations and counts as its window gives them."""
     points = window(template)
-    std = np.full(8, np.inf)
-    std[0] = 0.0
-    if len(points) < FEWEST_POINTS:
-        return replace(template, std=std)
-    h, w, trend, table, scale = template.height, template.width, template.trend, template.section.table, template.scale
-    _, plain, (n, psi2, slope) = kernel.normal_matrix(points, h, w, trend, table, scale, *loss_of(settings))
-    if n > 8 and slope > 0:
-        block = plain[_BLOCK]
-        d = 1 / np.sqrt(np.maximum(block.diagonal(), 1e-300))
-        inverse = np.linalg.pinv(block * np.outer(d, d), hermitian=True) * np.outer(d, d)
-        # Asymptotic variance of an M-estimator (Huber 1981, 7.6), with its small-sample factor.
-        factor = n * psi2 / slope**2 * n / (n - 7)
-        std[_FREE] = np.sqrt(inverse.diagonal() * factor)
-    return replace(template, std=std, points=len(points), inliers=int(n))
+    std, inliers = kernel.deviations(
+        points, template.height, template.width, template.trend, template.section.table, template.scale,
+        *loss_of(settings),
+    )
+    return replace(template, std=std, points=len(points), inliers=int(inliers))

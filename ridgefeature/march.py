@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.kernels.residual import rotation_of
+from ridgefeature.kernels.algebra import cross, facing, turned
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -20,6 +20,7 @@ Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
 _LARGEST_START = 0.5
+_ALIKE = math.cos(math.radians(5.0))
 _WORSE = 1.5
 """A fit whose noise is this many times that of the template before it is suspect."""
 _LARGEST_TURN = np.radians(60.0)
@@ -73,36 +74,23 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
         step = math.sqrt(chord @ chord)
         if len(chain) > 2:
             before = chain[-2].position - chain[-3].position
-            angle = math.atan2(normal @ np.cross(before, chord), before @ chord)
+            angle = math.atan2(normal @ cross(before, chord), before @ chord)
             per_length = 2 * angle / (step + math.sqrt(before @ before))
-            ways = [(_turned(chord, normal, 0.5 * step * per_length), per_length), (own, per_length), (own, 0.0)]
+            ways = [(turned(chord, normal, 0.5 * step * per_length), per_length), (own, per_length), (own, 0.0)]
         else:
             ways.append((chord, 0.0))
     starts = []
     for direction, per_length in ways:
-        frame = _facing(normal, direction)
+        frame = facing(normal, direction)
         half = 0.25 * (last.length + length) * per_length
         half = max(-_LARGEST_START, min(_LARGEST_START, half))
-        joint = last.position + 0.5 * last.length * _turned(frame[:, 0], normal, 0.5 * half)
-        frame = _facing(normal, _turned(frame[:, 0], normal, 2 * half))
+        joint = last.position + 0.5 * last.length * turned(frame[:, 0], normal, 0.5 * half)
+        frame = facing(normal, turned(frame[:, 0], normal, 2 * half))
         starts.append(replace(
             last, position=joint + 0.5 * length * frame[:, 0], rotation=frame, length=length,
             flank=settings.flank * last.width, trend=np.zeros(3), std=None, evidence=0.0, status="start",
         ))
     return starts
-
-
-def _turned(direction: Array, normal: Array, angle: float) -> Array:
-    """A direction turned about the normal (Rodrigues)."""
-    c, s = math.cos(angle), math.sin(angle)
-    return c * direction + s * np.cross(normal, direction) + (1 - c) * (normal @ direction) * normal
-
-
-def _facing(normal: Array, direction: Array) -> Array:
-    """The frame with this normal that faces along the direction, as far as the base allows."""
-    x = direction - normal * (direction @ normal)
-    x /= math.sqrt(x @ x)
-    return np.column_stack([x, np.cross(normal, x), normal])
 
 
 def _reject(fitted: Template, start: Template, settings: Settings) -> str:
@@ -142,7 +130,8 @@ def _fit_next(rough: Window, full: Window, chain: list[Template], settings: Sett
     the other starts are tried, and last all points of the window instead of some; the best fit is kept.
     """
     starts = append(chain, settings)
-    starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
+    if starts[0].rotation[:, 0] @ starts[1].rotation[:, 0] < _ALIKE if len(starts) > 1 else False:
+        starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
     best: tuple[Template, Template, str] | None = None
     for start, window in [*((s, rough) for s in starts), (starts[0], full)]:
         fitted = improve(window, start, settings)

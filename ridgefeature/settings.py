@@ -33,7 +33,7 @@ class Settings:
     flips: bool = _setting(True, "let a fit turn a ridge into a groove")  # type: ignore[assignment]
     height_change: float = _setting(4.0, "largest factor by which one fit may raise the height")  # type: ignore[assignment]
     evidence: float = _setting(25.0, "log likelihood ratio, doubled, above which a first window holds a ridge")  # type: ignore[assignment]
-    going_on: float = _setting(16.0, "the same for a window in which a known ridge is expected to go on")  # type: ignore[assignment]
+    going_on: float = _setting(20.0, "the same for a window in which a known ridge is expected to go on")  # type: ignore[assignment]
     look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")  # type: ignore[assignment]
     max_templates: int = _setting(500, "templates in all")  # type: ignore[assignment]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_of, refine
 from ridgefeature.kernels import residual as kernel
+from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.march import Track, reverse, turn_between
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -93,7 +94,7 @@ def _relength(template: Template, low: float, high: float) -> Template:
     """The patch from x = low to x = high of the template's own frame, on its bent path."""
     middle = 0.5 * (low + high)
     bend = template.trend[0]
-    turn, _ = kernel.rotation_of(np.array([0.0, 0.0, bend * middle]))
+    turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
     shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
     return replace(
         template, position=template.position + template.rotation @ shift, rotation=template.rotation @ turn,

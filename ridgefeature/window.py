@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.grid import Grid, nearest_distances, points_in_ball, points_in_box
-from ridgefeature.kernels.residual import select
+from ridgefeature.kernels.algebra import select
 from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class Window:
     spacing: float
     most: int = 3000
     """Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
-    _frame: tuple[Array, Array, Array] | None = field(default=None, init=False)
+    _held: tuple[Array, Array, Array] | None = field(default=None, init=False)
     _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
 
     def __call__(self, template: Template, before: float = 1.0, after: float = 1.0) -> Array:
@@ -36,23 +36,16 @@ class Window:
         half_y = template.half_breadth
         half_z = 2.0 * abs(template.height) + 0.25 * template.width
         low, high = -0.5 * template.length * before, 0.5 * template.length * after
-        middle = np.array([0.5 * (low + high), 0.0, 0.0])
-        half = np.array([0.5 * (high - low), half_y, half_z])
-        centre = template.position + template.rotation @ middle
-        if not self._covers(centre, template.rotation, half):
-            self._look_up(centre, template.rotation, _MARGIN * half)
-        position, rotation, _ = self._frame  # type: ignore[misc]
-        turn = rotation.T @ template.rotation
-        shift = rotation.T @ (template.position - position)
-        return select(self._points, shift, turn, low, high, half_y, half_z)
-
-    def _covers(self, centre: Array, rotation: Array, half: Array) -> bool:
-        if self._frame is None:
-            return False
-        position, old, reach = self._frame
-        if not 0.3 * reach[1] < half[1]:
-            return False
-        return bool((np.abs(old.T @ (centre - position)) + np.abs(old.T @ rotation) @ half <= reach).all())
+        box = (template.position, template.rotation, low, high, half_y, half_z)
+        # What is held serves only while it is not far larger than what is asked.
+        if self._held is not None and 0.3 * self._held[2][1] < half_y:
+            found, covered = select(self._points, *self._held, *box)
+            if covered:
+                return found
+        centre = template.position + 0.5 * (low + high) * template.rotation[:, 0]
+        half = _MARGIN * np.array([0.5 * (high - low), half_y, half_z])
+        self._look_up(centre, template.rotation, half)
+        return select(self._points, centre, template.rotation, half, *box)[0]
 
     def _look_up(self, centre: Array, rotation: Array, half: Array) -> None:
         expected = 4 * half[0] * half[1] * (0.5 / max(self.spacing, 1e-300)) ** 2
@@ -61,7 +54,7 @@ class Window:
             ratio = half[0] / half[1]
             cells = (max(round(np.sqrt(0.5 * self.most * ratio)), 1), max(round(np.sqrt(0.5 * self.most / ratio)), 1))
         self._points = points_in_box(self.grid, centre, rotation.T, half, cells)
-        self._frame = (centre, rotation, half)
+        self._held = (centre, rotation, half)
 
     def around(self, centre: Array, radius: float, frame: Array, most: int = 400) -> Array:
         """Points (m, 3) relative to centre within the radius, about `most` of them, spread evenly.

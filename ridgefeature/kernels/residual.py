@@ -20,6 +20,8 @@ import math
 import numpy as np
 from numba import njit
 
+from ridgefeature.kernels.algebra import rotation_of, solve_in_place, whitening
+
 HUBER, TUKEY, SQUARE, CAUCHY = 0, 1, 2, 3
 
 
@@ -72,132 +74,6 @@ def loss_jet(x, loss, tuning):
         q = 1.0 + (x / tuning) ** 2
         return 0.5 * tuning * tuning * math.log(q), x / q, 1.0 / q
     return 0.5 * x * x, x, 1.0
-
-
-@njit(cache=True)
-def cholesky_in_place(a):
-    """Lower Cholesky factor in the lower triangle of a (n, n); False where a is not positive definite."""
-    n = a.shape[0]
-    for j in range(n):
-        d = a[j, j]
-        least = 1e-14 * d
-        for k in range(j):
-            d -= a[j, k] * a[j, k]
-        if not d > least:
-            return False
-        a[j, j] = math.sqrt(d)
-        for i in range(j + 1, n):
-            s = a[i, j]
-            for k in range(j):
-                s -= a[i, k] * a[j, k]
-            a[i, j] = s / a[j, j]
-    return True
-
-
-@njit(cache=True)
-def solve_in_place(a, b):
-    """Solve a x = b for symmetric positive definite a (lower triangle read, overwritten); x replaces b."""
-    if not cholesky_in_place(a):
-        return False
-    n = b.size
-    for i in range(n):
-        for k in range(i):
-            b[i] -= a[i, k] * b[k]
-        b[i] /= a[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            b[i] -= a[k, i] * b[k]
-        b[i] /= a[i, i]
-    return True
-
-
-@njit(cache=True)
-def whitening(normal):
-    """(8, 7) transform whose Hessian is near unity, height and width each an axis of their own.
-
-    The first parameter (sliding) stays fixed. The other five placements are whitened by the Cholesky factor of
-    their block and follow height and width along the valley floor, so that bounds on height and width stay simple
-    bounds. normal (8, 8) of the mean loss.
-    """
-    lower = normal[1:, 1:].copy()
-    most = 0.0
-    for i in range(7):
-        most = max(most, lower[i, i])
-    for i in range(7):
-        lower[i, i] += 1e-9 * lower[i, i] + 1e-12 * most + 1e-300
-    transform = np.zeros((8, 7))
-    if not cholesky_in_place(lower):
-        for i in range(7):
-            transform[i + 1, i] = 1.0 / math.sqrt(normal[i + 1, i + 1] + 1e-9 * most + 1e-300)
-        return transform
-    for j in range(5):
-        for i in range(j, -1, -1):
-            s = 1.0 if i == j else 0.0
-            for k in range(i + 1, j + 1):
-                s -= lower[k, i] * transform[k + 1, j]
-            transform[i + 1, j] = s / lower[i, i]
-    for column in range(5, 7):
-        own = lower[column, column] ** 2
-        if column == 6:
-            own += lower[6, 5] ** 2
-        step = 1.0 / math.sqrt(own)
-        for i in range(4, -1, -1):
-            s = -lower[column, i] * step
-            for k in range(i + 1, 5):
-                s -= lower[k, i] * transform[k + 1, column]
-            transform[i + 1, column] = s / lower[i, i]
-        transform[column + 1, column] = step
-    return transform
-
-
-@njit(cache=True)
-def moved(position, rotation, p):
-    """Position (3,) and rotation (3, 3) after increments p (8,) in the frame they make."""
-    turn, _ = rotation_of(p[3:6])
-    turned = np.zeros((3, 3))
-    place = position.copy()
-    for i in range(3):
-        for j in range(3):
-            place[i] += rotation[i, j] * p[j]
-            for k in range(3):
-                turned[i, j] += rotation[i, k] * turn[k, j]
-    # Gram-Schmidt keeps long chains of products orthonormal.
-    out = np.empty((3, 3))
-    for j in range(3):
-        column = turned[:, j].copy()
-        for k in range(j):
-            dot = column[0] * out[0, k] + column[1] * out[1, k] + column[2] * out[2, k]
-            for i in range(3):
-                column[i] -= dot * out[i, k]
-        size = math.sqrt(column[0] ** 2 + column[1] ** 2 + column[2] ** 2)
-        for i in range(3):
-            out[i, j] = column[i] / size
-    return place, out
-
-
-@njit(cache=True)
-def rotation_of(vector):
-    """Rotation matrix (columns: new axes in the old frame) and right Jacobian of a rotation vector."""
-    x, y, z = vector[0], vector[1], vector[2]
-    square = x * x + y * y + z * z
-    angle = math.sqrt(square)
-    if angle < 1e-4:
-        a = 1.0 - square / 6.0
-        b = 0.5 - square / 24.0
-        c = 1.0 / 6.0 - square / 120.0
-    else:
-        a = math.sin(angle) / angle
-        b = (1.0 - math.cos(angle)) / square
-        c = (1.0 - a) / square
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    square_skew = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                square_skew[i, j] += skew[i, k] * skew[k, j]
-    rotation = np.eye(3) + a * skew + b * square_skew
-    jacobian = np.eye(3) - b * skew + c * square_skew
-    return rotation, jacobian
 
 
 @njit(cache=True)
@@ -254,44 +130,45 @@ def objective(q, gradient, transform, start, prior, trend, points, table, scale,
 
 
 @njit(cache=True)
-def normal_matrix(points, height, width, trend, table, scale, loss, tuning):
-    """Normal matrices of the residuals in units of the scale, at zero increments.
+def deviations(points, height, width, trend, table, scale, loss, tuning):
+    """Standard deviations (8,) of a fitted template's parameters, and its number of inliers.
 
-    points (n, 3) in the template's frame. Returns the weighted matrix (8, 8), the unweighted one over the
-    inliers (8, 8), and [number of inliers, their sum of psi^2, their sum of psi'], an inlier being a point
-    whose residual lies within `tuning` scales.
+    The asymptotic variance of an M-estimator (Huber 1981, 7.6) with its small-sample factor, from the points within
+    `tuning` scales. points (n, 3) in the template's frame. Infinite where the points do not tell.
     """
-    weighted = np.zeros((8, 8))
-    plain = np.zeros((8, 8))
-    sums = np.zeros(3)
+    normal = np.zeros((8, 8))
     row = np.empty(8)
+    inliers = 0
+    psi_square = psi_slope = 0.0
     step = 1e-4
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
         s = r / scale
-        _, psi, weight = loss_jet(s, loss, tuning)
-        inlier = 0.0
-        if abs(s) < tuning:
-            inlier = 1.0
-            sums[0] += 1.0
-            sums[1] += psi * psi
-            sums[2] += (loss_jet(s + step, loss, tuning)[1] - loss_jet(s - step, loss, tuning)[1]) / (2 * step)
+        if not abs(s) < tuning:
+            continue
+        inliers += 1
+        psi_square += loss_jet(s, loss, tuning)[1] ** 2
+        psi_slope += (loss_jet(s + step, loss, tuning)[1] - loss_jet(s - step, loss, tuning)[1]) / (2 * step)
         row[0], row[1], row[2] = -r_x, -r_y, -r_z
         row[3], row[4], row[5] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
         row[6], row[7] = r_h, r_w
         for j in range(8):
             for k in range(j + 1):
-                product = row[j] * row[k]
-                weighted[j, k] += weight * product
-                plain[j, k] += inlier * product
-    for j in range(8):
-        for k in range(j + 1):
-            weighted[j, k] /= scale * scale
-            plain[j, k] /= scale * scale
-            weighted[k, j] = weighted[j, k]
-            plain[k, j] = plain[j, k]
-    return weighted, plain, sums
+                normal[j, k] += row[j] * row[k]
+    std = np.full(8, np.inf)
+    std[0] = 0.0
+    if inliers <= 8 or not psi_slope > 0.0:
+        return std, inliers
+    factor = scale * scale * psi_square * inliers * inliers / (psi_slope * psi_slope * (inliers - 7))
+    free = normal[1:, 1:]
+    column = np.empty(7)
+    for i in range(7):
+        column[:] = 0.0
+        column[i] = 1.0
+        if solve_in_place(free.copy(), column):
+            std[i + 1] = math.sqrt(factor * column[i])
+    return std, inliers
 
 
 @njit(cache=True)
@@ -301,6 +178,44 @@ def robust_scale(points, height, width, trend, table, floor):
     for i in range(points.shape[0]):
         out[i] = abs(residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0])
     return max(1.4826 * np.median(out), floor)
+
+
+@njit(cache=True)
+def precondition(points, height, width, trend, table, scale, prior_weight):
+    """Whitening transform (8, 7) of the mean Huber loss of a template as it stands, from a few hundred points."""
+    normal = np.zeros((8, 8))
+    row = np.empty(8)
+    step = max(points.shape[0] // 300, 1)
+    count = 0
+    inverse_scale = 1.0 / scale
+    for i in range(0, points.shape[0], step):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
+        root = inverse_scale * math.sqrt(loss_jet(r * inverse_scale, HUBER, 1.345)[2])
+        row[0], row[1], row[2] = -r_x * root, -r_y * root, -r_z * root
+        row[3], row[4], row[5] = (r_y * z - r_z * y) * root, (r_z * x - r_x * z) * root, (r_x * y - r_y * x) * root
+        row[6], row[7] = r_h * root, r_w * root
+        for j in range(8):
+            for k in range(j + 1):
+                normal[j, k] += row[j] * row[k]
+        count += 1
+    for j in range(8):
+        for k in range(j + 1):
+            normal[j, k] /= count
+            normal[k, j] = normal[j, k]
+        normal[j, j] += prior_weight[j] / points.shape[0]
+    return whitening(normal)
+
+
+@njit(cache=True)
+def mean_loss(points, height, width, trend, table, scale, loss, tuning):
+    """Mean robust loss of a template as it stands, and the share of points beyond three scales."""
+    total, far = 0.0, 0
+    for i in range(points.shape[0]):
+        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0] / scale
+        total += loss_jet(r, loss, tuning)[0]
+        far += abs(r) > 3.0
+    return total / points.shape[0], far / points.shape[0]
 
 
 @njit(cache=True)
@@ -329,22 +244,6 @@ def losses(x, loss, tuning):
     for i in range(x.size):
         out[i] = loss_jet(x[i], loss, tuning)[0]
     return out
-
-
-@njit(cache=True)
-def select(points, shift, rotation, low_x, high_x, half_y, half_z):
-    """Points (n, 3) of a frame brought to the frame (shift, rotation columns), those in the box kept."""
-    out = np.empty_like(points)
-    m = 0
-    for i in range(points.shape[0]):
-        dx, dy, dz = points[i, 0] - shift[0], points[i, 1] - shift[1], points[i, 2] - shift[2]
-        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
-        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
-        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
-        if low_x <= x <= high_x and abs(y) <= half_y and abs(z) <= half_z:
-            out[m, 0], out[m, 1], out[m, 2] = x, y, z
-            m += 1
-    return out[:m]
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ridgefeature.kernels.residual import solve_in_place
+from ridgefeature.kernels.algebra import solve_in_place
 
 
 @njit(cache=True, inline="always")
