@@ -1,0 +1,199 @@
+"""Small dense algebra and rotations for one template: no LAPACK call, so nothing is loaded for it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def cholesky_in_place(a):
+    """Lower Cholesky factor in the lower triangle of a (n, n); False where a is not positive definite."""
+    n = a.shape[0]
+    for j in range(n):
+        d = a[j, j]
+        least = 1e-14 * d
+        for k in range(j):
+            d -= a[j, k] * a[j, k]
+        if not d > least:
+            return False
+        a[j, j] = math.sqrt(d)
+        for i in range(j + 1, n):
+            s = a[i, j]
+            for k in range(j):
+                s -= a[i, k] * a[j, k]
+            a[i, j] = s / a[j, j]
+    return True
+
+
+@njit(cache=True)
+def solve_in_place(a, b):
+    """Solve a x = b for symmetric positive definite a (lower triangle read, overwritten); x replaces b."""
+    if not cholesky_in_place(a):
+        return False
+    n = b.size
+    for i in range(n):
+        for k in range(i):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[k, i] * b[k]
+        b[i] /= a[i, i]
+    return True
+
+
+@njit(cache=True)
+def whitening(normal):
+    """(8, 7) transform whose Hessian is near unity, height and width each an axis of their own.
+
+    The first parameter (sliding) stays fixed. The other five placements are whitened by the Cholesky factor of
+    their block and follow height and width along the valley floor, so that bounds on height and width stay simple
+    bounds. normal (8, 8) of the mean loss.
+    """
+    lower = normal[1:, 1:].copy()
+    most = 0.0
+    for i in range(7):
+        most = max(most, lower[i, i])
+    for i in range(7):
+        lower[i, i] += 1e-9 * lower[i, i] + 1e-12 * most + 1e-300
+    transform = np.zeros((8, 7))
+    if not cholesky_in_place(lower):
+        for i in range(7):
+            transform[i + 1, i] = 1.0 / math.sqrt(normal[i + 1, i + 1] + 1e-9 * most + 1e-300)
+        return transform
+    for j in range(5):
+        for i in range(j, -1, -1):
+            s = 1.0 if i == j else 0.0
+            for k in range(i + 1, j + 1):
+                s -= lower[k, i] * transform[k + 1, j]
+            transform[i + 1, j] = s / lower[i, i]
+    for column in range(5, 7):
+        own = lower[column, column] ** 2
+        if column == 6:
+            own += lower[6, 5] ** 2
+        step = 1.0 / math.sqrt(own)
+        for i in range(4, -1, -1):
+            s = -lower[column, i] * step
+            for k in range(i + 1, 5):
+                s -= lower[k, i] * transform[k + 1, column]
+            transform[i + 1, column] = s / lower[i, i]
+        transform[column + 1, column] = step
+    return transform
+
+
+@njit(cache=True)
+def moved(position, rotation, p):
+    """Position (3,) and rotation (3, 3) after increments p (8,) in the frame they make."""
+    turn, _ = rotation_of(p[3:6])
+    turned = np.zeros((3, 3))
+    place = position.copy()
+    for i in range(3):
+        for j in range(3):
+            place[i] += rotation[i, j] * p[j]
+            for k in range(3):
+                turned[i, j] += rotation[i, k] * turn[k, j]
+    # Gram-Schmidt keeps long chains of products orthonormal.
+    out = np.empty((3, 3))
+    for j in range(3):
+        column = turned[:, j].copy()
+        for k in range(j):
+            dot = column[0] * out[0, k] + column[1] * out[1, k] + column[2] * out[2, k]
+            for i in range(3):
+                column[i] -= dot * out[i, k]
+        size = math.sqrt(column[0] ** 2 + column[1] ** 2 + column[2] ** 2)
+        for i in range(3):
+            out[i, j] = column[i] / size
+    return place, out
+
+
+@njit(cache=True)
+def rotation_of(vector):
+    """Rotation matrix (columns: new axes in the old frame) and right Jacobian of a rotation vector."""
+    x, y, z = vector[0], vector[1], vector[2]
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < 1e-4:
+        a = 1.0 - square / 6.0
+        b = 0.5 - square / 24.0
+        c = 1.0 / 6.0 - square / 120.0
+    else:
+        a = math.sin(angle) / angle
+        b = (1.0 - math.cos(angle)) / square
+        c = (1.0 - a) / square
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    square_skew = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                square_skew[i, j] += skew[i, k] * skew[k, j]
+    rotation = np.eye(3) + a * skew + b * square_skew
+    jacobian = np.eye(3) - b * skew + c * square_skew
+    return rotation, jacobian
+
+
+@njit(cache=True)
+def turned(direction, normal, angle):
+    """A direction (3,) turned about the unit normal (Rodrigues)."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    along = (1.0 - cosine) * (normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2])
+    return cosine * direction + sine * cross(normal, direction) + along * normal
+
+
+@njit(cache=True)
+def facing(normal, direction):
+    """The frame (columns) with this unit normal that faces along the direction, as far as the base allows."""
+    x = direction - normal * (normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2])
+    x /= math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+    out = np.empty((3, 3))
+    out[:, 0] = x
+    out[:, 1] = cross(normal, x)
+    out[:, 2] = normal
+    return out
+
+
+@njit(cache=True)
+def cross(a, b):
+    """Vector product of a (3,) and b (3,)."""
+    out = np.empty(3)
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+    return out
+
+
+@njit(cache=True)
+def select(points, old_position, old_rotation, reach, position, rotation, low, high, half_y, half_z):
+    """Points of the frame `old` brought to a new frame, those in the new box kept; and whether old covers it.
+
+    points (n, 3) hold everything within `reach` (3,) of the old frame's origin, in that frame. The new box runs
+    from low to high in x and lies within half_y and half_z in y and z. Frames: origin (3,), axes as columns.
+    """
+    turn = np.zeros((3, 3))
+    shift = np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            shift[i] += old_rotation[k, i] * (position[k] - old_position[k])
+            for j in range(3):
+                turn[i, j] += old_rotation[k, i] * rotation[k, j]
+    covered = True
+    middle, half_x = 0.5 * (low + high), 0.5 * (high - low)
+    for i in range(3):
+        need = abs(shift[i] + turn[i, 0] * middle)
+        need += abs(turn[i, 0]) * half_x + abs(turn[i, 1]) * half_y + abs(turn[i, 2]) * half_z
+        covered &= need <= reach[i]
+    if not covered:
+        return np.empty((0, 3)), False
+    out = np.empty_like(points)
+    m = 0
+    for i in range(points.shape[0]):
+        dx, dy, dz = points[i, 0] - shift[0], points[i, 1] - shift[1], points[i, 2] - shift[2]
+        x = turn[0, 0] * dx + turn[1, 0] * dy + turn[2, 0] * dz
+        y = turn[0, 1] * dx + turn[1, 1] * dy + turn[2, 1] * dz
+        z = turn[0, 2] * dx + turn[1, 2] * dy + turn[2, 2] * dz
+        if low <= x <= high and abs(y) <= half_y and abs(z) <= half_z:
+            out[m, 0], out[m, 1], out[m, 2] = x, y, z
+            m += 1
+    return out[:m], True
