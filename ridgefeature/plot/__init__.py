@@ -1,0 +1,6 @@
+"""Pictures of a registered ridge, as PNG files."""
+
+from ridgefeature.plot.curves import profile
+from ridgefeature.plot.pictures import view
+
+__all__ = ["profile", "view"]
