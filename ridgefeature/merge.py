@@ -24,7 +24,7 @@ LEAST_BORDER = 0.5 + 2 * _OUTSIDE / 3
 def section_knots(section: Section) -> Array:
     """Knots across, in widths: simple at feet and between, the end of the flanks repeated."""
     end = np.full(DEGREE + 1, 0.5 + _OUTSIDE)
-    return np.concatenate([-end, np.linspace(-0.5, 0.5, len(section.table) + 1), end])
+    return np.concatenate([-end, np.linspace(-0.5, 0.5, section.spans + 1), end])
 
 
 def section_poles(section: Section) -> tuple[Array, Array]:

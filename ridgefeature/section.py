@@ -25,7 +25,7 @@ class Section:
     coefficients: Array
     name: str = "custom"
     table: Array = field(init=False, repr=False)
-    """(m + 3, 4) coefficients of 1, x, x^2, x^3 in each span, x in [0, 1)."""
+    """(m + 5, 4) coefficients of 1, x, x^2, x^3 in each span, x in [0, 1); a row of zeros before and after."""
 
     def __post_init__(self) -> None:
         raised = np.array(self.coefficients, dtype=np.float64)
@@ -45,15 +45,20 @@ class Section:
     def __call__(self, eta: ArrayLike, derivative: int = 0) -> Array:
         """Height at eta = y / width, or its derivative with respect to eta; 0 beyond the feet. Any shape."""
         eta = np.asarray(eta, dtype=np.float64)
-        spans = len(self.table)
+        spans = self.spans
         position = (eta + 0.5) * spans
-        span = np.clip(np.floor(position), 0, spans - 1).astype(np.intp)
-        x = position - span
+        span = np.clip(np.floor(position) + 1, 0, spans + 1).astype(np.intp)
+        x = position + 1 - span
         rows = self.table[span]
         for _ in range(derivative):
             rows = rows[..., 1:] * np.arange(1, rows.shape[-1])
         value = sum(rows[..., k] * x**k for k in range(rows.shape[-1])) * float(spans) ** derivative
         return np.where((position >= 0) & (position < spans), value, 0.0)
+
+    @property
+    def spans(self) -> int:
+        """Knot spans from foot to foot."""
+        return len(self.table) - 2
 
     @property
     def half_height_width(self) -> float:
@@ -70,7 +75,7 @@ class Section:
 
 def _table(raised: Array) -> Array:
     padded = np.concatenate([np.zeros(3), raised, np.zeros(3)])
-    return np.array([padded[i : i + 4] @ _UNIFORM_CUBIC for i in range(raised.size + 3)])
+    return np.array([[0.0] * 4, *(padded[i : i + 4] @ _UNIFORM_CUBIC for i in range(raised.size + 3)), [0.0] * 4])
 
 
 def _largest(table: Array) -> float:

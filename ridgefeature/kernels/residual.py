@@ -7,7 +7,8 @@ first-order distance to the surface (Sampson 1982). Parameters are ordered
     o_x o_y o_z   rotation vector about the start frame's origin
     height, width
 
-`table` holds the section as cubics, one row a span: coefficients of 1, x, x^2, x^3 with x in [0, 1).
+`table` holds the section as cubics, one row a span: coefficients of 1, x, x^2, x^3 with x in [0, 1); the first and
+the last row are zeros and stand for what lies outside the feet.
 `trend` (3,) holds what the neighbours tell and the fit takes as given: the curvature of the path (y is measured
 from the osculating circle, to second order), and the slopes of height and width along x. A template alone has
 zeros.
@@ -16,6 +17,7 @@ zeros.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -24,24 +26,27 @@ from ridgefeature.kernels.algebra import rotation_of, solve_in_place, whitening
 
 HUBER, TUKEY, SQUARE, CAUCHY = 0, 1, 2, 3
 
+# Sums may be reordered and divisions go unchecked: the loops over points then run in SIMD, three times faster.
+_INNER: dict[str, Any] = {"fastmath": True, "error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"cache": True, **_INNER}
 
-@njit(cache=True, inline="always")
-def residual_jet(x, y, z, height, width, trend, table):
-    """Residual and its derivatives with respect to x, y, z, height and width."""
-    spans = table.shape[0]
-    across = 1.0 / max(1.0 - trend[0] * y, 0.2)
-    lean = trend[0] * x * across
-    y -= 0.5 * lean * x
-    height += trend[1] * x
-    inverse_width = 1.0 / max(width + trend[2] * x, 0.1 * width)
-    eta = y * inverse_width
-    position = (eta + 0.5) * spans
-    if not 0.0 <= position < spans:
-        return z, 0.0, 0.0, 1.0, 0.0, 0.0
-    span = int(position)
+
+@njit(**_INNER)
+def residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic):
+    """Residual and its derivatives with respect to x, y, z, height and width. Free of branches, for SIMD.
+
+    The trend as its three numbers, the table as its four columns: tuples would hinder SIMD.
+    """
+    spans = constant.size - 2.0
+    lean = bend * x / max(1.0 - bend * y, 0.2)
+    height += rise * x
+    inverse_width = 1.0 / max(width + widening * x, 0.1 * width)
+    eta = (y - 0.5 * lean * x) * inverse_width
+    position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
+    span = np.int64(position)
     t = position - span
-    b, c, d = table[span, 1], table[span, 2], table[span, 3]
-    g = table[span, 0] + t * (b + t * (c + t * d))
+    b, c, d = linear[span], quadratic[span], cubic[span]
+    g = constant[span] + t * (b + t * (c + t * d))
     per_y = spans * inverse_width
     slope = per_y * (b + t * (2.0 * c + 3.0 * t * d))
     f1 = height * slope
@@ -49,34 +54,88 @@ def residual_jet(x, y, z, height, width, trend, table):
     square = 1.0 / (1.0 + f1 * f1)
     inverse = math.sqrt(square)
     r = (z - height * g) * inverse
-    bend = r * f1 * square
-    r_y = -f1 * inverse - bend * f2
-    r_h = -g * inverse - bend * slope
-    r_w = eta * f1 * inverse + bend * (eta * f2 + f1 * inverse_width)
-    r_x = -r_y * lean + r_h * trend[1] + r_w * trend[2]
+    curl = r * f1 * square
+    r_y = -f1 * inverse - curl * f2
+    r_h = -g * inverse - curl * slope
+    r_w = eta * f1 * inverse + curl * (eta * f2 + f1 * inverse_width)
+    r_x = -r_y * lean + r_h * rise + r_w * widening
     r_y *= 1.0 - 0.5 * lean * lean
     return r, r_x, r_y, inverse, r_h, r_w
 
 
-@njit(cache=True, inline="always")
+@njit(**_INNER)
+def columns(array):
+    """The columns of an array (n, 3), each contiguous: loops over them run in SIMD, which is worth the copy."""
+    return array[:, 0].copy(), array[:, 1].copy(), array[:, 2].copy()
+
+
+@njit(**_INNER)
+def split(table):
+    """The four columns of a section's table, each contiguous."""
+    return table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy(), table[:, 3].copy()
+
+
+@njit(**_INNER)
 def loss_jet(x, loss, tuning):
-    """Loss rho(x), its derivative psi(x) and the weight psi(x) / x, for a residual in units of its scale."""
+    """Loss rho(x) and its derivative psi(x), for a residual in units of its scale."""
     if loss == TUKEY:
-        if abs(x) >= tuning:
-            return tuning * tuning / 6.0, 0.0, 0.0
-        q = 1.0 - (x / tuning) ** 2
-        return tuning * tuning / 6.0 * (1.0 - q * q * q), x * q * q, q * q
+        q = max(1.0 - (x / tuning) * (x / tuning), 0.0)
+        return tuning * tuning / 6.0 * (1.0 - q * q * q), x * q * q
     if loss == HUBER:
-        if abs(x) <= tuning:
-            return 0.5 * x * x, x, 1.0
-        return tuning * (abs(x) - 0.5 * tuning), math.copysign(tuning, x), tuning / abs(x)
+        psi = min(max(x, -tuning), tuning)
+        return psi * (x - 0.5 * psi), psi
     if loss == CAUCHY:
-        q = 1.0 + (x / tuning) ** 2
-        return 0.5 * tuning * tuning * math.log(q), x / q, 1.0 / q
-    return 0.5 * x * x, x, 1.0
+        q = 1.0 + (x / tuning) * (x / tuning)
+        return 0.5 * tuning * tuning * math.log(q), x / q
+    return 0.5 * x * x, x
 
 
-@njit(cache=True)
+@njit(**_INNER)
+def weight_of(x, loss, tuning):
+    """Weight psi(x) / x of a residual in units of its scale."""
+    if loss == TUKEY:
+        return max(1.0 - (x / tuning) * (x / tuning), 0.0) ** 2
+    if loss == HUBER:
+        return tuning / max(abs(x), tuning)
+    if loss == CAUCHY:
+        return 1.0 / (1.0 + (x / tuning) * (x / tuning))
+    return 1.0
+
+
+@njit(**_INNER)
+def _sums(points, p, rotation, trend, table, scale, loss, tuning):
+    """Sum of the loss, and of psi times the residual's gradient: by x, y, z, rotation about x, y, z, height, width."""
+    inverse_scale = 1.0 / scale
+    p0, p1, p2, height, width = p[0], p[1], p[2], p[6], p[7]
+    r00, r10, r20 = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+    r01, r11, r21 = rotation[0, 1], rotation[1, 1], rotation[2, 1]
+    r02, r12, r22 = rotation[0, 2], rotation[1, 2], rotation[2, 2]
+    total = g_x = g_y = g_z = c_x = c_y = c_z = g_h = g_w = 0.0
+    column_x, column_y, column_z = columns(points)
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
+    for i in range(column_x.size):
+        dx, dy, dz = column_x[i] - p0, column_y[i] - p1, column_z[i] - p2
+        x = r00 * dx + r10 * dy + r20 * dz
+        y = r01 * dx + r11 * dy + r21 * dz
+        z = r02 * dx + r12 * dy + r22 * dz
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
+        rho, psi = loss_jet(r * inverse_scale, loss, tuning)
+        total += rho
+        a, b, c = psi * r_y, psi * r_z, psi * r_x
+        g_x += c
+        g_y += a
+        g_z += b
+        # A rotation phi of the body moves a point by u x phi, so the sum is of gradient x u.
+        c_x += a * z - b * y
+        c_y += b * x - c * z
+        c_z += c * y - a * x
+        g_h += psi * r_h
+        g_w += psi * r_w
+    return total, g_x, g_y, g_z, c_x, c_y, c_z, g_h, g_w
+
+
+@njit(**_OPTIONS)
 def objective(q, gradient, transform, start, prior, trend, points, table, scale, loss, tuning):
     """Mean robust loss at parameters start + transform @ q; its gradient in q is written to `gradient`.
 
@@ -88,28 +147,16 @@ def objective(q, gradient, transform, start, prior, trend, points, table, scale,
         for j in range(q.size):
             p[i] += transform[i, j] * q[j]
     rotation, jacobian = rotation_of(p[3:6])
-    height, width = p[6], p[7]
-    inverse_scale = 1.0 / scale
-    total = 0.0
-    g_x = g_y = g_z = c_x = c_y = c_z = g_h = g_w = 0.0
-    for i in range(points.shape[0]):
-        dx, dy, dz = points[i, 0] - p[0], points[i, 1] - p[1], points[i, 2] - p[2]
-        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
-        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
-        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
-        rho, psi, _ = loss_jet(r * inverse_scale, loss, tuning)
-        total += rho
-        a, b, c = psi * r_y, psi * r_z, psi * r_x
-        g_x += c
-        g_y += a
-        g_z += b
-        c_x += a * z - b * y
-        c_y += b * x - c * z
-        c_z += c * y - a * x
-        g_h += psi * r_h
-        g_w += psi * r_w
-    # The residual's gradient in the body frame is (r_x, r_y, r_z); a body rotation moves u by u x phi.
+    # One loop for each loss: a loop that asks which loss it is does not run in SIMD.
+    if loss == TUKEY:
+        sums = _sums(points, p, rotation, trend, table, scale, TUKEY, tuning)
+    elif loss == HUBER:
+        sums = _sums(points, p, rotation, trend, table, scale, HUBER, tuning)
+    elif loss == CAUCHY:
+        sums = _sums(points, p, rotation, trend, table, scale, CAUCHY, tuning)
+    else:
+        sums = _sums(points, p, rotation, trend, table, scale, SQUARE, tuning)
+    total, g_x, g_y, g_z, c_x, c_y, c_z, g_h, g_w = sums
     if gradient.size > 0:
         full = np.empty(8)
         for i in range(3):
@@ -129,13 +176,15 @@ def objective(q, gradient, transform, start, prior, trend, points, table, scale,
     return total / points.shape[0]
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def deviations(points, height, width, trend, table, scale, loss, tuning):
     """Standard deviations (8,) of a fitted template's parameters, and its number of inliers.
 
     The asymptotic variance of an M-estimator (Huber 1981, 7.6) with its small-sample factor, from the points within
     `tuning` scales. points (n, 3) in the template's frame. Infinite where the points do not tell.
     """
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
     normal = np.zeros((8, 8))
     row = np.empty(8)
     inliers = 0
@@ -143,7 +192,7 @@ def deviations(points, height, width, trend, table, scale, loss, tuning):
     step = 1e-4
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
         s = r / scale
         if not abs(s) < tuning:
             continue
@@ -171,18 +220,22 @@ def deviations(points, height, width, trend, table, scale, loss, tuning):
     return std, inliers
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def robust_scale(points, height, width, trend, table, floor):
     """Standard deviation of the residuals from the median of their absolute values, not below floor."""
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        out[i] = abs(residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0])
+        out[i] = abs(residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0])
     return max(1.4826 * np.median(out), floor)
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def precondition(points, height, width, trend, table, scale, prior_weight):
     """Whitening transform (8, 7) of the mean Huber loss of a template as it stands, from a few hundred points."""
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
     normal = np.zeros((8, 8))
     row = np.empty(8)
     step = max(points.shape[0] // 300, 1)
@@ -190,8 +243,8 @@ def precondition(points, height, width, trend, table, scale, prior_weight):
     inverse_scale = 1.0 / scale
     for i in range(0, points.shape[0], step):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, trend, table)
-        root = inverse_scale * math.sqrt(loss_jet(r * inverse_scale, HUBER, 1.345)[2])
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
+        root = inverse_scale * math.sqrt(weight_of(r * inverse_scale, HUBER, 1.345))
         row[0], row[1], row[2] = -r_x * root, -r_y * root, -r_z * root
         row[3], row[4], row[5] = (r_y * z - r_z * y) * root, (r_z * x - r_x * z) * root, (r_x * y - r_y * x) * root
         row[6], row[7] = r_h * root, r_w * root
@@ -207,37 +260,43 @@ def precondition(points, height, width, trend, table, scale, prior_weight):
     return whitening(normal)
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def mean_loss(points, height, width, trend, table, scale, loss, tuning):
     """Mean robust loss of a template as it stands, and the share of points beyond three scales."""
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
     total, far = 0.0, 0
     for i in range(points.shape[0]):
-        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0] / scale
+        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0] / scale
         total += loss_jet(r, loss, tuning)[0]
         far += abs(r) > 3.0
     return total / points.shape[0], far / points.shape[0]
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def residuals(points, height, width, trend, table):
     """Residuals (n,) of points (n, 3) in the template's frame."""
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        out[i] = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0]
+        out[i] = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
     return out
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def evidence(points, height, width, trend, table, scale, loss, tuning):
     """Twice the loss that a plane has more than the template; points (n, 3) in the template's frame."""
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
     ridge = 0.0
     for i in range(points.shape[0]):
-        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, trend, table)[0]
+        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
         ridge += loss_jet(r / scale, loss, tuning)[0]
     return 2.0 * (plane_loss(points, scale, loss, tuning, 5) - ridge)
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def losses(x, loss, tuning):
     """Loss (n,) of residuals x (n,) in units of their scale."""
     out = np.empty(x.size)
@@ -246,7 +305,7 @@ def losses(x, loss, tuning):
     return out
 
 
-@njit(cache=True)
+@njit(**_OPTIONS)
 def plane_loss(points, scale, loss, tuning, iterations):
     """Smallest robust loss of a plane z = a + b x + c y found by reweighting; points (n, 3)."""
     normal = np.zeros((3, 3))
@@ -260,8 +319,8 @@ def plane_loss(points, scale, loss, tuning, iterations):
         for i in range(points.shape[0]):
             x, y, z = points[i, 0], points[i, 1], points[i, 2]
             r = z - plane[0] - plane[1] * x - plane[2] * y
-            rho, _, weight = loss_jet(r / scale, loss, tuning)
-            total += rho
+            weight = weight_of(r / scale, loss, tuning)
+            total += loss_jet(r / scale, loss, tuning)[0]
             normal[0, 0] += weight
             normal[1, 0] += weight * x
             normal[2, 0] += weight * y

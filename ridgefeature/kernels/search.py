@@ -23,7 +23,7 @@ def _product(matrix, vector):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def best_straight_ridge(points, width, angles, offsets, table, sign):
     """Least squares of z on plane + one ridge section, for every direction and offset; the best is returned.
 
@@ -33,7 +33,7 @@ def best_straight_ridge(points, width, angles, offsets, table, sign):
     angle, offset, height, a, b, c) with the base plane z = a + b x + c y.
     """
     n = points.shape[0]
-    spans = table.shape[0]
+    spans = table.shape[0] - 2
     moments = np.zeros((3, 3))
     z_moments = np.zeros(3)
     zz = 0.0
@@ -70,8 +70,8 @@ def best_straight_ridge(points, width, angles, offsets, table, sign):
                 x, y = points[i, 0], points[i, 1]
                 position = ((cosine * y - sine * x) / width - offset + 0.5) * spans
                 if 0.0 <= position < spans:
-                    span = int(position)
-                    t = position - span
+                    span = int(position) + 1
+                    t = position + 1 - span
                     g = table[span, 0] + t * (table[span, 1] + t * (table[span, 2] + t * table[span, 3]))
                     g_moments[0] += g
                     g_moments[1] += g * x
