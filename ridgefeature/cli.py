@@ -1,0 +1,128 @@
+"""The command line: what can be asked for. How it is done is in `ridgefeature.commands`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ridgefeature.commands.console import Program
+from ridgefeature.commands.options import SettingsCommand
+
+_FILE = click.Path(path_type=Path)
+_OUT = "ridge-out"
+_DEMO = "ridge-demo"
+
+
+@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="ridgefeature", prog_name="ridgefeature")
+def main() -> None:
+    """Register a ridge in a 3D scan as a CAD feature with a height and a width.
+
+    Exit status: 0 done, 2 bad input, 3 no ridge there, 130 interrupted.
+    """
+
+
+@main.command()
+@click.argument("folder", metavar="[DIR]", type=_FILE, default=Path(_DEMO))
+def demo(folder: Path) -> int:
+    """Make the paper's spiral and register it: scan, feature, STEP, pictures.
+
+    They go to DIR (ridge-demo if not given); files of the same names there are replaced.
+    """
+    from ridgefeature.commands.demo import run
+
+    return run(folder)
+
+
+@main.command(cls=SettingsCommand)
+@click.argument("scan", type=_FILE)
+@click.option(
+    "--at",
+    type=float,
+    nargs=3,
+    metavar="X Y Z",
+    required=True,
+    help="The pick: a point on or near the ridge.",
+)
+@click.option(
+    "--direction", type=float, nargs=3, metavar="DX DY DZ", help="Along the ridge, from its start to its end."
+)
+@click.option("--width", type=float, metavar="W", help="Starting guess of the width between the feet.")
+@click.option("--height", type=float, metavar="H", help="Starting guess of the height.")
+@click.option(
+    "--kind",
+    type=click.Choice(["ridge", "groove", "auto"]),
+    default="ridge",
+    show_default=True,
+    help="What to look for.",
+)
+@click.option("--roi", type=float, metavar="R", help="Leave out points further than this from the pick.")
+@click.option(
+    "--unit",
+    metavar="UNIT",
+    help="Length unit of the file: um, mm, cm, m, km, in, ft.  [default: what the format says, else mm]",
+)
+@click.option(
+    "--sample", type=int, metavar="N", help="Points to sample on a mesh or CAD file.  [default: 200000]"
+)
+@click.option("--vertices", is_flag=True, help="Take a mesh's vertices instead of sampling its faces.")
+@click.option(
+    "--out",
+    type=_FILE,
+    default=Path(_OUT),
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the files; those of the same names there are replaced.",
+)
+@click.option("--no-step", is_flag=True, help="Write no ridge.step.")
+@click.option("--no-pictures", is_flag=True, help="Write no profile.png and view.png.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+def register(**options: Any) -> int:
+    """Register the ridge in SCAN under the picked point.
+
+    Writes feature.ridge.json, ridge.step, profile.png (height and width along the ridge) and view.png to DIR.
+    Lengths are in the scan's unit. Ctrl-C ends the march and keeps what is there.
+    """
+    from ridgefeature.commands.register import run
+
+    return run(**options)
+
+
+@main.command()
+@click.argument("feature", type=_FILE)
+@click.option(
+    "-o", "--output", type=_FILE, required=True, metavar="X.step", help="File to write: .step .stp .brep .stl"
+)
+@click.option(
+    "--h",
+    "h",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="RATE",
+    help="Multiply the height by this.",
+)
+@click.option(
+    "--w", "w", type=float, default=1.0, show_default=True, metavar="RATE", help="Multiply the width by this."
+)
+def export(feature: Path, output: Path, h: float, w: float) -> None:
+    """Write the surface of FEATURE as CAD, in millimetres, taller or slimmer if asked.
+
+    FEATURE is a .ridge.json, or a STEP file that carries a feature.
+    """
+    from ridgefeature.commands.export import run
+
+    run(feature, output, h, w)
+
+
+@main.command()
+@click.argument("file", type=_FILE)
+@click.option("--unit", metavar="UNIT", help="Length unit of a scan.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+def info(file: Path, unit: str | None, as_json: bool) -> None:
+    """Tell what a scan, a feature or a CAD file holds."""
+    from ridgefeature.commands.info import run
+
+    run(file, unit, as_json)

@@ -1,0 +1,119 @@
+"""Words on the terminal: errors as one line with an exit status, warnings as one line, tables, JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import warnings
+from collections.abc import Iterable
+from typing import Any, NoReturn
+
+import click
+
+BAD_INPUT, NO_RIDGE, INTERRUPTED = 2, 3, 130
+_INTERRUPTED = "interrupted; no file is half written"
+
+
+class Program(click.Group):
+    """A click group whose every failure is one line on stderr: 2 bad input, 3 no ridge, 130 interrupted."""
+
+    def main(self, *args: Any, **options: Any) -> NoReturn:
+        options["standalone_mode"] = False
+        with warnings.catch_warnings():
+            if not sys.warnoptions:
+                warnings.simplefilter("ignore")
+                warnings.filterwarnings("always", category=UserWarning)
+            warnings.showwarning = _show_warning
+            sys.exit(self._status(*args, **options))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; an interrupt is caught before click makes two lines of it."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            return fail(_INTERRUPTED, INTERRUPTED)
+
+    def _status(self, *args: Any, **options: Any) -> int:
+        try:
+            result = super().main(*args, **options)
+        except click.exceptions.NoArgsIsHelpError as error:
+            click.echo(error.format_message())
+            return 0
+        except click.ClickException as error:
+            return fail(error.format_message(), BAD_INPUT)
+        except (click.Abort, KeyboardInterrupt):
+            return fail(_INTERRUPTED, INTERRUPTED)
+        except OSError as error:
+            return fail(_reason(error), BAD_INPUT)
+        except ValueError as error:
+            from ridgefeature import NoRidgeError
+
+            return fail(str(error), NO_RIDGE if isinstance(error, NoRidgeError) else BAD_INPUT)
+        return result if isinstance(result, int) else 0
+
+
+def fail(message: str, status: int) -> int:
+    """Say why on stderr, in one line; returns the exit status."""
+    click.echo(f"ridgefeature: {one_line(message)}", err=True)
+    return status
+
+
+def one_line(text: str) -> str:
+    """The text with every run of white space made one space."""
+    return " ".join(text.split())
+
+
+def print_json(document: dict[str, Any]) -> None:
+    """One JSON object on stdout; null for numbers that JSON cannot write."""
+    click.echo(json.dumps(_plain(document), indent=1, allow_nan=False))
+
+
+def print_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
+    """Two columns on stdout, names and values."""
+    rows = list(rows)
+    if not sys.stdout.isatty():
+        # A script wants whole lines, and nothing that takes time to import.
+        breadth = max(len(name) for name, _ in rows)
+        click.echo("\n".join([title, *(f"{name:<{breadth}}  {value}" for name, value in rows)]))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=Text(title), title_justify="left", show_header=False, box=None, pad_edge=False)
+    table.title_style = "bold"
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(Text(name), Text(value))
+    Console(highlight=False).print(table)
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number to read: so many significant digits, no exponent for large ones."""
+    return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
+
+
+def point(values: Iterable[float]) -> str:
+    """Coordinates to read and to paste behind --at."""
+    return " ".join(f"{value:.6g}" for value in values)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _reason(error: OSError) -> str:
+    """Python's own errors say the number first and the file last; the file matters most."""
+    if error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    click.echo(f"ridgefeature: warning: {one_line(str(message))}", err=True)

@@ -1,0 +1,103 @@
+"""`ridgefeature info`: what a file holds."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from ridgefeature.commands import output
+from ridgefeature.commands.console import number, point, print_json, print_table
+from ridgefeature.commands.feature_file import CAD, load_feature
+from ridgefeature.settings import Settings
+
+Found = tuple[str, list[tuple[str, str]], dict[str, Any]]
+
+
+def run(file: Path, unit: str | None, as_json: bool) -> None:
+    """Print it. Raises ValueError or OSError for a file that cannot be read."""
+    suffix = file.suffix.lower()
+    if suffix == ".json":
+        title, rows, document = _feature(file)
+    elif suffix in CAD and unit is None:
+        title, rows, document = _step(file)
+    else:
+        title, rows, document = _scan(file, unit)
+    if as_json:
+        print_json({"file": str(file), **document})
+    else:
+        print_table(f"{file}: {title}", rows)
+
+
+def _feature(file: Path) -> Found:
+    ridge = load_feature(file)
+    default = Settings()
+    changed = [
+        f"{f.name} {getattr(ridge.settings, f.name)}"
+        for f in fields(Settings)
+        if getattr(ridge.settings, f.name) != getattr(default, f.name)
+    ]
+    source = (
+        "not known" if ridge.source is None else f"{ridge.source.name}, sha256 {ridge.source.sha256[:12]}..."
+    )
+    rows = [
+        *output.rows(ridge),
+        ("registered from", source),
+        ("settings changed", ", ".join(changed) or "none"),
+    ]
+    return "a ridge feature", rows, {"kind": "feature", **output.document(ridge)}
+
+
+def _scan(file: Path, unit: str | None) -> Found:
+    from ridgefeature.grid import build_grid, typical_spacing
+    from ridgefeature.io.read import FORMATS, read_scan
+
+    scan = read_scan(file, unit=unit)
+    low, high = scan.bounds
+    spacing = typical_spacing(build_grid(scan.points))
+    middle = scan.points[((scan.points - 0.5 * (low + high)) ** 2).sum(axis=1).argmin()]
+    rows = [
+        ("points", f"{len(scan):,}"),
+        ("unit", scan.unit),
+        ("lowest x y z", point(low)),
+        ("highest x y z", point(high)),
+        ("size", f"{' x '.join(number(x) for x in high - low)} {scan.unit}"),
+        ("typical spacing", f"{number(spacing, 3)} {scan.unit}"),
+        ("a point in the middle", point(middle)),
+    ]
+    document = {
+        "kind": "scan",
+        "points": len(scan),
+        "unit": scan.unit,
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "spacing": float(spacing),
+    }
+    return f"{FORMATS[file.suffix.lower()].title}, read as a scan", rows, document
+
+
+def _step(file: Path) -> Found:
+    """Shapes and their box; and the feature, where one is carried."""
+    if not file.is_file():
+        raise FileNotFoundError(f"{file}: there is no such file: check the path")
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
+    from OCP.TopExp import TopExp
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    import cad_export
+
+    shape = cad_export.read_step(file)
+    counts = {}
+    for name, kind in (("solids", TopAbs_SOLID), ("faces", TopAbs_FACE)):
+        found = TopTools_IndexedMapOfShape()
+        TopExp.MapShapes_s(shape, kind, found)
+        counts[name] = found.Extent()
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    ends = box.Get()
+    low, high = ends[:3], ends[3:]
+    rows = [(name, f"{count:,}") for name, count in counts.items()]
+    rows += [("unit", "mm"), ("lowest x y z", point(low)), ("highest x y z", point(high))]
+    return "a STEP file", rows, {"kind": "step", **counts, "unit": "mm", "low": list(low), "high": list(high)}

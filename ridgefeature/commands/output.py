@@ -1,0 +1,90 @@
+"""What is written and said about a registered ridge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ridgefeature.commands.console import number, one_line, point, print_table
+from ridgefeature.ridge import Ridge
+from ridgefeature.scan import Scan
+
+FEATURE, STEP, PROFILE, VIEW = "feature.ridge.json", "ridge.step", "profile.png", "view.png"
+
+
+def file_names(step: bool, pictures: bool) -> list[str]:
+    """The files that `write` writes."""
+    return [FEATURE, *([STEP] if step else []), *([PROFILE, VIEW] if pictures else [])]
+
+
+def write(ridge: Ridge, scan: Scan, folder: Path, step: bool, pictures: bool) -> dict[str, str]:
+    """Write the files of a ridge; returns what is in each and its path."""
+    ridge.save(folder / FEATURE)
+    files = {"feature": str(folder / FEATURE)}
+    if step:
+        import cad_export
+
+        cad_export.step(ridge, folder / STEP)
+        files["step"] = str(folder / STEP)
+    if pictures:
+        from ridgefeature import plot
+
+        plot.profile(ridge, folder / PROFILE, scan)
+        plot.view(scan, ridge, folder / VIEW)
+        files |= {"profile": str(folder / PROFILE), "view": str(folder / VIEW)}
+    return files
+
+
+def document(ridge: Ridge) -> dict[str, Any]:
+    """The summary for machines: the ridge's own, and its values at the stations."""
+    arrays = "arc_length", "height", "height_std", "width", "width_std", "half_height_width"
+    return {
+        **ridge.summary(),
+        "source": None if ridge.source is None else ridge.source.name,
+        "pick": ridge.pick.tolist(),
+        "interrupted": interrupted(ridge),
+        "stations": {name: getattr(ridge, name).tolist() for name in arrays},
+    }
+
+
+def rows(ridge: Ridge) -> list[tuple[str, str]]:
+    """The summary for people."""
+    found, unit = ridge.summary(), ridge.unit
+    return [
+        ("length", f"{number(ridge.length)} {unit}{', a ring' if ridge.closed else ''}"),
+        ("templates", str(len(ridge.templates))),
+        ("height h", _span(ridge.height, unit, ridge.height_std)),
+        ("width w, foot to foot", _span(ridge.width, unit, ridge.width_std)),
+        ("width at half height", _span(ridge.half_height_width, unit)),
+        ("section", found["section"]),
+        (
+            "mean distance M",
+            f"{number(found['M'], 3)} {unit}, where a perfect patch has {number(found['M_floor'], 3)}",
+        ),
+        ("noise", f"{number(found['noise'], 3)} {unit}"),
+        ("pick", point(ridge.pick)),
+        ("start stopped because", ridge.stop[0]),
+        ("end stopped because", ridge.stop[1]),
+    ]
+
+
+def show(ridge: Ridge, files: dict[str, str]) -> None:
+    """Print the summary and the files written."""
+    name = "ridge" if ridge.source is None else f"ridge in {ridge.source.name}"
+    print_table(name, [*rows(ridge), *((f"wrote {kind}", path) for kind, path in files.items())])
+
+
+def interrupted(ridge: Ridge) -> bool:
+    """Whether the march was stopped by hand."""
+    from ridgefeature.march import INTERRUPTED
+
+    return INTERRUPTED in ridge.stop
+
+
+def _span(values: Any, unit: str, std: Any = None) -> str:
+    low, high = number(values.min()), number(values.max())
+    text = f"{low if low == high else f'{low} to {high}'} {unit}"
+    if std is None:
+        return text
+    least, most = number(std.min(), 2), number(std.max(), 2)
+    return one_line(f"{text}, standard deviation {least if least == most else f'{least} to {most}'}")

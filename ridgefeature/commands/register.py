@@ -1,0 +1,42 @@
+"""`ridgefeature register`: from a scan file and a pick to a feature, STEP and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ridgefeature import read_scan, register
+from ridgefeature.commands import output
+from ridgefeature.commands.console import INTERRUPTED, fail, print_json
+from ridgefeature.commands.folder import output_folder
+from ridgefeature.commands.options import settings_from
+from ridgefeature.commands.progress import shown_progress
+
+
+def run(
+    scan: Path,
+    out: Path,
+    no_step: bool,
+    no_pictures: bool,
+    as_json: bool,
+    unit: str | None,
+    sample: int | None,
+    vertices: bool,
+    **options: Any,
+) -> int:
+    """Do it and print the summary; returns the exit status. options: hints and settings of `register`."""
+    settings = settings_from(options)
+    step, pictures = not no_step, not no_pictures
+    with output_folder(out, output.file_names(step, pictures)) as folder:
+        count = {} if sample is None else {"sample": sample}
+        points = read_scan(scan, vertices=vertices, unit=unit, **count)
+        with shown_progress(points.unit) as progress:
+            ridge = register(points, settings=settings, progress=progress, **options)
+        files = output.write(ridge, points, folder, step, pictures)
+    if as_json:
+        print_json({**output.document(ridge), "files": files})
+    else:
+        output.show(ridge, files)
+    if output.interrupted(ridge):
+        return fail("interrupted: the ridge goes as far as the march had come", INTERRUPTED)
+    return 0
