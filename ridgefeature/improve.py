@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import nlopt
 import numpy as np
@@ -65,7 +65,7 @@ def loss_of(settings: Settings) -> tuple[int, float]:
 def _moved(template: Template, p: Array) -> Template:
     """The template after increments p (8,) in its own frame."""
     position, rotation = moved(template.position, template.rotation, p)
-    return replace(template, position=position, rotation=rotation, height=float(p[6]), width=float(p[7]))
+    return template.changed(position=position, rotation=rotation, height=float(p[6]), width=float(p[7]))
 
 
 def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, float], tolerance: float,
@@ -114,7 +114,7 @@ def sized(template: Template, settings: Settings) -> Template:
         usual = template.points * length / template.length
         width_error = 3.8 * template.scale / (abs(template.height) * np.sqrt(usual))
         length *= float(np.clip((width_error / settings.wanted_error) ** 2, 1.0, settings.longest))
-    return replace(template, length=length, flank=settings.flank * template.width)
+    return template.changed(length=length, flank=settings.flank * template.width)
 
 
 def start_loss(window: Window, start: Template, scale: float) -> float:
@@ -136,7 +136,7 @@ def improve(window: Window, start: Template, settings: Settings) -> Template:
     """
     points = window(start)
     if len(points) < FEWEST_POINTS:
-        return replace(start, status="no data", points=len(points), std=None)
+        return start.changed(status="no data", points=len(points), std=None)
     limits = limits_of(start.height, start.width, settings)
     template, evaluations, status = _minimise(
         points, start, _scale(points, start), _HUBER, _ROUGH, limits, settings
@@ -164,7 +164,7 @@ def _rounds(window: Window, template: Template, limits: Limits, tolerance: float
         before = template.width
         points = window(template)
         if len(points) < FEWEST_POINTS:
-            return replace(template, status="no data", points=len(points), std=None)
+            return template.changed(status="no data", points=len(points), std=None)
         scale = _scale(points, template)
         template, n, status = _minimise(points, template, scale, loss, tolerance, limits, settings)
         evaluations += n
@@ -181,8 +181,7 @@ def _noted(points: Array, template: Template, scale: float, evaluations: int, st
         points, template.height, template.width, template.trend, template.section.table, contrast,
         *loss_of(settings),
     )
-    return replace(
-        template, scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=float(evidence)
+    return template.changed(scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=float(evidence)
     )
 
 
@@ -193,4 +192,4 @@ def judge(window: Window, template: Template, settings: Settings) -> Template:
         points, template.height, template.width, template.trend, template.section.table, template.scale,
         *loss_of(settings),
     )
-    return replace(template, std=std, points=len(points), inliers=int(inliers))
+    return template.changed(std=std, points=len(points), inliers=int(inliers))

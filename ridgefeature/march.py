@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.kernels.algebra import cross, facing, turned
+from ridgefeature.kernels.algebra import cross, turned, walk
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -19,7 +19,6 @@ Array = NDArray[np.float64]
 Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
-_LARGEST_START = 0.5
 _ALIKE = math.cos(math.radians(5.0))
 _WORSE = 1.5
 """A fit whose noise is this many times that of the template before it is suspect."""
@@ -36,23 +35,9 @@ class Track:
 
 def reverse(template: Template) -> Template:
     """The same patch, seen by someone who walks the other way."""
-    return replace(
-        template,
-        rotation=template.rotation * np.array([-1.0, -1.0, 1.0]),
+    return template.changed(rotation=template.rotation * np.array([-1.0, -1.0, 1.0]),
         trend=-template.trend,
     )
-
-
-def turn_between(first: Template, second: Template) -> Array:
-    """Rotation vector, in the first frame, that takes the first frame to the second."""
-    return _rotation_vector(first.rotation.T @ second.rotation)
-
-
-def _rotation_vector(r: Array) -> Array:
-    axis = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    sine = math.sqrt(axis @ axis)
-    angle = math.atan2(sine, 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1))
-    return axis * (angle / sine if sine > 1e-12 else 1.0)
 
 
 def append(chain: list[Template], settings: Settings) -> list[Template]:
@@ -79,17 +64,13 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
             ways = [(turned(chord, normal, 0.5 * step * per_length), per_length), (own, per_length), (own, 0.0)]
         else:
             ways.append((chord, 0.0))
+    start = last.changed(
+        length=length, flank=settings.flank * last.width, trend=np.zeros(3), std=None, evidence=0.0, status="start"
+    )
     starts = []
     for direction, per_length in ways:
-        frame = facing(normal, direction)
-        half = 0.25 * (last.length + length) * per_length
-        half = max(-_LARGEST_START, min(_LARGEST_START, half))
-        joint = last.position + 0.5 * last.length * turned(frame[:, 0], normal, 0.5 * half)
-        frame = facing(normal, turned(frame[:, 0], normal, 2 * half))
-        starts.append(replace(
-            last, position=joint + 0.5 * length * frame[:, 0], rotation=frame, length=length,
-            flank=settings.flank * last.width, trend=np.zeros(3), std=None, evidence=0.0, status="start",
-        ))
+        position, frame = walk(last.position, normal, direction, per_length, 0.5 * last.length, 0.5 * length)
+        starts.append(start.changed(position=position, rotation=frame))
     return starts
 
 

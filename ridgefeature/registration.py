@@ -12,7 +12,6 @@ from ridgefeature.distance import sampling_floor
 from ridgefeature.grid import Grid, build_grid, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
 from ridgefeature.march import Progress, Track, march, reverse
-from ridgefeature.merge import template_surface
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.section import bell
@@ -108,12 +107,12 @@ def _directed(track: Track, pick: Array, hints: Hints) -> Track:
 
 def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Template, ...]:
     """The templates with M, their mean distance to the scan, and what it would be for a perfect patch."""
-    along, across = (np.arange(8) + 0.5) / 8, (np.arange(16) + 0.5) / 8 - 1
+    along, across = (np.arange(6) + 0.5) / 6, (np.arange(12) + 0.5) / 6 - 1
     samples, areas = [], []
     for t in templates:
         y = across * t.half_breadth
         z = t.height * t.section(y / t.width)
-        local = np.empty((8, 16, 3))
+        local = np.empty((6, 12, 3))
         local[..., 0] = ((along - 0.5) * t.length)[:, None]
         local[..., 1] = y + 0.5 * t.trend[0] * local[..., 0] ** 2
         local[..., 2] = z

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_of, refine
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.kernels.algebra import rotation_of
-from ridgefeature.march import Track, reverse, turn_between
+from ridgefeature.march import Track, reverse
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -21,21 +20,21 @@ Array = NDArray[np.float64]
 
 def trends(templates: list[Template]) -> list[Template]:
     """Each template with the path's curvature and the slopes of height and width that its neighbours show."""
-    out = []
-    for i, template in enumerate(templates):
-        first, second = templates[max(i - 1, 0)], templates[min(i + 1, len(templates) - 1)]
-        step = float(np.linalg.norm(template.position - first.position) + np.linalg.norm(second.position - template.position))
-        if step == 0:
-            out.append(replace(template, trend=np.zeros(3)))
-            continue
-        turn = turn_between(first, second)
-        # The turn about the normal, seen from the template's own frame.
-        about = float(template.rotation[:, 2] @ (first.rotation @ turn))
-        limit = 0.9 / template.half_breadth
-        trend = np.array([np.clip(about / step, -limit, limit), (second.height - first.height) / step,
-                          (second.width - first.width) / step])
-        out.append(replace(template, trend=trend))
-    return out
+    n = len(templates)
+    if n < 2:
+        return [t.changed(trend=np.zeros(3)) for t in templates]
+    first, second = np.maximum(np.arange(n) - 1, 0), np.minimum(np.arange(n) + 1, n - 1)
+    frames = np.array([t.rotation for t in templates])
+    sizes = np.array([(t.height, t.width) for t in templates])
+    steps = np.diff(np.array([t.position for t in templates]), axis=0)
+    at = np.concatenate([[0.0], np.cumsum(np.sqrt((steps * steps).sum(axis=1)))])
+    gap = (at[second] - at[first])[:, None]
+    before, after, up = frames[first, :, 0], frames[second, :, 0], frames[:, :, 2]
+    turn = np.arctan2((up * np.cross(before, after)).sum(axis=1), (before * after).sum(axis=1))
+    limit = 0.9 / np.array([t.half_breadth for t in templates])
+    bend = np.clip(turn / gap[:, 0], -limit, limit)
+    rows = np.column_stack([bend, (sizes[second] - sizes[first]) / gap])
+    return [t.changed(trend=row) for t, row in zip(templates, rows, strict=True)]
 
 
 def _change_point(window: Window, template: Template, reach: float, settings: Settings) -> float | None:
@@ -96,8 +95,7 @@ def _relength(template: Template, low: float, high: float) -> Template:
     bend = template.trend[0]
     turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
     shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
-    return replace(
-        template, position=template.position + template.rotation @ shift, rotation=template.rotation @ turn,
+    return template.changed(position=template.position + template.rotation @ shift, rotation=template.rotation @ turn,
         length=high - low, height=template.height + template.trend[1] * middle,
         width=max(template.width + template.trend[2] * middle, 0.5 * template.width),
     )
@@ -118,7 +116,7 @@ def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:
 
 def settle(window: Window, track: Track, section: Section, settings: Settings) -> Track:
     """Refit every template with the trend of its neighbours and the given section."""
-    known = trends([replace(t, section=section) for t in track.templates])
+    known = trends([t.changed(section=section) for t in track.templates])
     settings = settings.marching()
     fitted = [refine(window, t, _expected(known, i, settings), settings) for i, t in enumerate(known)]
     kept = [old if new.status in ("failed", "no data") else new for new, old in zip(fitted, known, strict=True)]

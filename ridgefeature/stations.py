@@ -82,6 +82,15 @@ def interpolating_curve(sites: Array, points: Array) -> Curve:
     return Curve(np.linalg.solve(basis_matrix(knots, degree, sites), points), knots, degree)
 
 
+def _arc_lengths(path: Curve, sites: Array, per_site: int = 64) -> tuple[Array, Array]:
+    """Parameters, dense between the sites, and the arc length of the curve up to each (Simpson's rule)."""
+    fine = np.interp(np.arange(per_site * (len(sites) - 1) + 1) / per_site, np.arange(len(sites)), sites)
+    speed = np.linalg.norm(path(fine, 1), axis=1)
+    ends = fine[::2]
+    pieces = np.diff(ends) / 6 * (speed[:-2:2] + 4 * speed[1::2] + speed[2::2])
+    return ends, np.concatenate([[0.0], np.cumsum(pieces)])
+
+
 def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
@@ -101,12 +110,14 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     sites = np.array([_on_path(first, -0.5 * first.length), *(t.position for t in templates),
                       _on_path(last, 0.5 * last.length)])
     chords = np.linalg.norm(np.diff(sites, axis=0), axis=1)
-    path = interpolating_curve(np.concatenate([[0.0], np.cumsum(chords)]), sites)
-    total = float(path.arc_length())
+    parameters = np.concatenate([[0.0], np.cumsum(chords)])
+    path = interpolating_curve(parameters, sites)
     k = int(np.clip(_PER_TEMPLATE * len(templates) + 1, 13, _MOST))
+    fine, lengths = _arc_lengths(path, parameters)
+    total = float(lengths[-1])
     s = np.linspace(0.0, total, k)
-    t = path.at_arc_length(s)
-    at = path.arc_length(path.domain[0], np.cumsum(chords)[: len(templates)])
+    t = np.interp(s, lengths, fine)
+    at = np.interp(parameters[1:-1], fine, lengths)
     tangent = _unit(path(t, 1))
     ends = np.concatenate([[0.0], at, [total]])
     up = np.array([first.rotation[:, 2], *(q.rotation[:, 2] for q in templates), last.rotation[:, 2]])

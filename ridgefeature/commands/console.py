@@ -90,11 +90,6 @@ def print_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
     Console(highlight=False).print(table)
 
 
-def number(value: float, digits: int = 4) -> str:
-    """A number to read: so many significant digits, no exponent for large ones."""
-    return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
-
-
 def point(values: Iterable[float]) -> str:
     """Coordinates to read and to paste behind --at."""
     return " ".join(f"{value:.6g}" for value in values)

@@ -9,9 +9,10 @@ import numpy as np
 
 from ridgefeature import Ridge, read_scan, register
 from ridgefeature.commands import output
-from ridgefeature.commands.console import INTERRUPTED, fail, number, print_table
+from ridgefeature.commands.console import INTERRUPTED, fail, print_table
 from ridgefeature.commands.folder import beside, output_folder
 from ridgefeature.commands.progress import shown_progress
+from ridgefeature.readable import number
 from ridgefeature.synthetic import Spiral
 
 SCAN, TALLER = "spiral.npy", "ridge_h1.5.step"

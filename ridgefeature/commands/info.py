@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ridgefeature.commands import output
-from ridgefeature.commands.console import number, point, print_json, print_table
+from ridgefeature.commands.console import point, print_json, print_table
 from ridgefeature.commands.feature_file import CAD, load_feature
+from ridgefeature.readable import number
 from ridgefeature.settings import Settings
 
 Found = tuple[str, list[tuple[str, str]], dict[str, Any]]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ridgefeature.commands.console import number, one_line, point, print_table
+from ridgefeature.commands.console import one_line, point, print_table
+from ridgefeature.readable import number
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
 

@@ -155,6 +155,20 @@ def facing(normal, direction):
 
 
 @njit(cache=True)
+def walk(position, normal, direction, bend, first, second):
+    """Position and frame after `first` and then `second` along a path that bends by `bend` per length.
+
+    Straight to the joint along the mean direction of the first stretch, then along that of the second; no stretch
+    turns by more than half a radian.
+    """
+    half = max(-0.5, min(0.5, 0.5 * (first + second) * bend))
+    frame = facing(normal, direction)
+    joint = position + first * turned(frame[:, 0].copy(), normal, 0.5 * half)
+    frame = facing(normal, turned(frame[:, 0].copy(), normal, 2.0 * half))
+    return joint + second * frame[:, 0], frame
+
+
+@njit(cache=True)
 def cross(a, b):
     """Vector product of a (3,) and b (3,)."""
     out = np.empty(3)

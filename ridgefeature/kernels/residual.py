@@ -293,7 +293,7 @@ def evidence(points, height, width, trend, table, scale, loss, tuning):
     for i in range(points.shape[0]):
         r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
         ridge += loss_jet(r / scale, loss, tuning)[0]
-    return 2.0 * (plane_loss(points, scale, loss, tuning, 5) - ridge)
+    return 2.0 * (plane_loss(points, scale, loss, tuning, 5)[0] - ridge)
 
 
 @njit(**_OPTIONS)
@@ -307,11 +307,11 @@ def losses(x, loss, tuning):
 
 @njit(**_OPTIONS)
 def plane_loss(points, scale, loss, tuning, iterations):
-    """Smallest robust loss of a plane z = a + b x + c y found by reweighting; points (n, 3)."""
+    """Smallest robust loss of a plane z = a + b x + c y found by reweighting, and the plane; points (n, 3)."""
     normal = np.zeros((3, 3))
     right = np.zeros(3)
     plane = np.zeros(3)
-    best = np.inf
+    best, best_plane = np.inf, plane.copy()
     for _ in range(iterations):
         normal[:] = 0.0
         right[:] = 0.0
@@ -330,8 +330,24 @@ def plane_loss(points, scale, loss, tuning, iterations):
             right[0] += weight * r
             right[1] += weight * r * x
             right[2] += weight * r * y
-        best = min(best, total)
+        if total < best:
+            best, best_plane = total, plane.copy()
         if not solve_in_place(normal, right):
             break
         plane += right
-    return best
+    return best, best_plane
+
+
+@njit(**_OPTIONS)
+def explained(points, height, width, trend, table):
+    """Log of the mean absolute residual of the best plane over that of the template, both clipped at the height.
+
+    points (n, 3) in the template's frame. Unlike evidence it grows as the noise found shrinks, so it tells good
+    fits of different windows apart.
+    """
+    most = abs(height)
+    plane = plane_loss(points, 0.3 * most, HUBER, 1.345, 5)[1]
+    ridge = residuals(points, height, width, trend, table)
+    flat = points[:, 2] - plane[0] - plane[1] * points[:, 0] - plane[2] * points[:, 1]
+    least = 1e-3 * most * points.shape[0]
+    return math.log((np.minimum(np.abs(flat), most).sum() + least) / (np.minimum(np.abs(ridge), most).sum() + least))

@@ -61,7 +61,9 @@ def oblique(ridge: Ridge, surface: Array, aspect: float) -> Camera:
 def _frame(ridge: Ridge) -> tuple[Array, Array, Array]:
     """Right, up and normal: along a long ridge, from its start; else as the scan's x axis lies."""
     mean = ridge.normal.mean(axis=0)
-    normal = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.2 else ridge.normal[len(mean) // 2]
+    normal = (
+        mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.2 else ridge.normal[len(ridge.normal) // 2]
+    )
     (long, a), (_, b) = _spread(ridge, normal)
     if a > _LONG * b:
         right = long if (ridge.spine[-1] - ridge.spine[0]) @ long >= 0 else -long

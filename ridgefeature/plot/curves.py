@@ -108,7 +108,8 @@ def _templates(axes: Any, ridge: Ridge, values: list[float], column: int, colour
 def _finish(axes: Any, values: Array) -> None:
     """Zero in sight, and no runaway band or bar may flatten the curve."""
     low, high = min(0.0, values.min()), max(0.0, values.max())
-    room = 0.12 * (high - low)
+    room = 0.12 * (high - low) or 1.0
+    high = high or (room if low == 0 else 0.0)
     axes.set_ylim(low - (room if low < 0 else 0.0), high + (room if high > 0 else 0.0))
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)

@@ -13,6 +13,7 @@ from ridgefeature.plot import camera as cameras
 from ridgefeature.plot.camera import Camera
 from ridgefeature.plot.files import new_figure, save
 from ridgefeature.plot.scene import SPINE, SURFACE, TEMPLATE, Pixels, Scene, build, render
+from ridgefeature.readable import number
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 
@@ -73,7 +74,7 @@ def _norm(ridge: Ridge) -> Any:
     from matplotlib.colors import Normalize
 
     low, high = min(0.0, ridge.height.min()), max(0.0, ridge.height.max())
-    room = 0.15 * (high - low)
+    room = 0.15 * (high - low) or 0.1 * ridge.width.max()
     return Normalize(low - room, high + room, clip=True)
 
 
@@ -245,8 +246,3 @@ def _figures(ridge: Ridge) -> str:
         f"{number(ridge.length)} {ridge.unit} long, {span(ridge.height)} high, {span(ridge.width)} wide, "
         f"{count} template{'s' if count != 1 else ''}"
     )
-
-
-def number(value: float, digits: int = 4) -> str:
-    """A number to read: so many significant digits, no exponent for large ones."""
-    return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
