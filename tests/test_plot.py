@@ -14,7 +14,7 @@ import ridgefeature as rf
 from ridgefeature import plot
 from ridgefeature.plot import camera, scene
 from ridgefeature.plot.collapse import local_coordinates, outline, template_places, thinned
-from ridgefeature.plot.pictures import number
+from ridgefeature.readable import number
 from ridgefeature.synthetic import Spiral
 
 SPIRAL = Spiral()
@@ -188,6 +188,15 @@ def test_view_of_few_metres_and_many_points(
     near = built.points[built.on_ridge]
     expected = SPIRAL.elevation(near[:, :2])
     assert np.abs(built.heights[built.on_ridge] - expected).mean() < 0.3
+
+
+def test_a_flattened_ridge_and_no_points_near_it(ridge: rf.Ridge, tmp_path: Path) -> None:
+    flat = ridge.resized(h=0)
+    figure = plot.profile(flat, tmp_path / "p.png")
+    low, high = figure.axes[0].get_ylim()
+    assert low == 0 < high
+    plot.view(SPIRAL.points(500, seed=1) + 1e4, flat, tmp_path / "v.png")
+    assert pixels(tmp_path / "v.png")[100:800, 900:1600].std() > 0.02
 
 
 def test_far_points_are_left_out(ridge: rf.Ridge) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.plot import camera as cameras
 from ridgefeature.plot.camera import Camera
 from ridgefeature.plot.files import new_figure, save
-from ridgefeature.plot.scene import SPINE, SURFACE, TEMPLATE, Pixels, Scene, build, render
+from ridgefeature.plot.scene import SPINE, SURFACE, TEMPLATE, Pixels, Scene, build, render, surface_colours
 from ridgefeature.readable import number
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
@@ -118,9 +118,8 @@ def _draw_flat(axes: Any, scene: Scene, eye: Camera, colours: Pixels, solid: boo
         )
         middle = scene.surface[:-1, :-1].reshape(-1, 3)
         shade = np.abs(scene.normals[:-1, :-1].reshape(-1, 3) @ (eye.toward - 0.5 * eye.right + 0.3 * eye.up))
-        paint = np.clip(0.35 + 0.6 * shade, 0, 1)[:, None] * np.array(
-            [int(SURFACE[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-        )
+        tint = np.broadcast_to(surface_colours(scene)[:-1], (*grid[:-1, :-1].shape[:2], 3)).reshape(-1, 3)
+        paint = np.clip(0.35 + 0.6 * shade, 0, 1)[:, None] * tint
         back = np.argsort(middle @ eye.toward)
         axes.add_collection(
             PolyCollection(list(quads[back]), facecolors=paint[back], edgecolors="face", lw=0.3, zorder=2)
@@ -201,7 +200,7 @@ def _triad(axes: Any, eye: Camera, aspect: float) -> None:
     for tip, name in tips:
         way = tip / max(np.linalg.norm(tip), 1e-300)
         # An axis that points at the eye, or lies on a longer one, would only be a blot.
-        if np.linalg.norm(tip) < 0.2 or any(way @ other > 0.9 for other in drawn):
+        if np.linalg.norm(tip) < 0.2 or any(way @ other > 0.97 for other in drawn):
             continue
         drawn.append(way)
         style = {"arrowstyle": "-|>", "lw": 1.5, "color": "black", "shrinkA": 0, "shrinkB": 0}

@@ -16,14 +16,17 @@ Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 SURFACE, SPINE, TEMPLATE = "#f59e0b", "#dc2626", "#111827"
+_CREST = "#ffc65c"
 MOST = 200_000
 OVERSAMPLING = 2
+_ACROSS = 61
 
 
 @dataclass(frozen=True)
 class Scene:
     """points (n, 3) of the scan near the ridge, their heights (n,) over the base and whether (n,) they lie on
-    the ridge's surface; the surface as a grid (nu, nv, 3) with its normals; the spine and the outlines of
+    the ridge's surface; the surface as a grid (nu, nv, 3) with its normals and,
+    across it, its height (nv,) in apex heights; the spine and the outlines of
     templates as lines (m, 3); noise: how far points usually lie off the surface."""
 
     points: Array
@@ -31,6 +34,7 @@ class Scene:
     on_ridge: NDArray[np.bool_]
     surface: Array
     normals: Array
+    crest: Array
     spine: Array
     outlines: list[Array]
     noise: float
@@ -39,7 +43,7 @@ class Scene:
 def build(ridge: Ridge, points: Array) -> Scene:
     """The scene of a ridge in scan points (n, 3); far points are left out, at most MOST are kept."""
     surface = ridge.surface()
-    grid = surface.grid(8 * len(ridge.arc_length), 61)
+    grid = surface.grid(8 * len(ridge.arc_length), _ACROSS)
     u, v = np.gradient(grid, axis=0), np.gradient(grid, axis=1)
     normals = np.cross(u, v)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
@@ -52,6 +56,7 @@ def build(ridge: Ridge, points: Array) -> Scene:
         on_ridge,
         grid,
         normals,
+        ridge.section(np.linspace(*surface.domain[1], _ACROSS)),
         ridge.spine + ridge.height[:, None] * ridge.normal,
         [outline(t) for t in ridge.templates],
         float(np.median([t.scale for t in ridge.templates])),
@@ -148,6 +153,12 @@ def _actor(renderer: Any, data: Any) -> Any:
     return actor
 
 
+def surface_colours(scene: Scene) -> Array:
+    """(nv, 3), 0 to 1: paler towards the crest, so that a ridge too low for shades is seen."""
+    part = scene.crest[:, None]
+    return (1 - part) * 0.86 * np.array(_rgb(SURFACE)) + part * np.array(_rgb(_CREST))
+
+
 def _dot(scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
     """Breadth of a scan point in pixels: most of the picture is covered, however dense the scan is."""
     seen = np.abs(camera.project(scene.points)) <= [camera.half_width, camera.half_height]
@@ -175,8 +186,9 @@ def _add_surface(renderer: Any, scene: Scene, shift: Array) -> None:
     data = _polydata(scene.surface + shift)
     data.SetPolys(_cells(np.stack([c.ravel() for c in corners], axis=1)))
     data.GetPointData().SetNormals(numpy_to_vtk(scene.normals.reshape(-1, 3).copy(), deep=True))
+    paint = np.broadcast_to(255 * surface_colours(scene), (nu, nv, 3)).reshape(-1, 3).astype(np.uint8)
+    data.GetPointData().SetScalars(numpy_to_vtk(paint, deep=True))
     look = _actor(renderer, data).GetProperty()
-    look.SetColor(*_rgb(SURFACE))
     look.SetAmbient(0.38)
     look.SetDiffuse(0.72)
     look.SetSpecular(0.15)
