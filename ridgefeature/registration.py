@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.distance import sampling_floor
 from ridgefeature.grid import Grid, build_grid, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
+from ridgefeature.learn import choose_section, first_section, with_section
 from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
-from ridgefeature.section import bell
 from ridgefeature.settings import Settings
-from ridgefeature.settle import choose_section, place_ends, prune, settle
+from ridgefeature.settle import place_ends, prune, settle
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -78,7 +78,7 @@ def register(
 
 def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints, settings: Settings,
            progress: Progress | None) -> Track:
-    first = guess(rough, pick, extent, hints, bell(), settings)
+    first = guess(rough, pick, extent, hints, first_section(settings), settings)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
@@ -87,9 +87,14 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
         )
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
-    track = prune(full, settle(full, track, bell(), settings), settings)
-    section = choose_section(full, track, settings)
-    return track if section is track.templates[0].section else settle(full, track, section, settings)
+    track = prune(full, settle(full, track, settings), settings)
+    section = choose_section(full, track.templates, settings)
+    if section is track.templates[0].section:
+        return track
+    templates = tuple(with_section(t, section) for t in track.templates)
+    # The ends move with the section: settled once, they are placed again.
+    track = settle(full, Track(templates, track.stop), settings)
+    return settle(full, place_ends(full, track, settings), settings)
 
 
 def _directed(track: Track, pick: Array, hints: Hints) -> Track:

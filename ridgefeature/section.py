@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -12,6 +13,10 @@ Array = NDArray[np.float64]
 
 # Uniform cubic B-spline on one span, as coefficients of 1, x, x^2, x^3; one row for each of the four poles.
 _UNIFORM_CUBIC = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0
+
+
+REACH = 4
+"""Raised control points on either side of the apex's, in sections that were fitted to a shape or to points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,3 +107,32 @@ def bell() -> Section:
 def plateau() -> Section:
     """Three control points raised alike on six spans: the apex is at their height, half height at half width."""
     return Section(np.ones(3), "plateau")
+
+
+@lru_cache(maxsize=1)
+def cosine() -> Section:
+    """About (1 + cos(2 pi eta)) / 2: nine raised control points on twelve spans."""
+    return _fitted(lambda eta: 0.5 + 0.5 * np.cos(2 * np.pi * eta), "cosine")
+
+
+@lru_cache(maxsize=1)
+def dome() -> Section:
+    """About the parabola 1 - 4 eta^2, rounded at the feet: nine raised control points on twelve spans."""
+    return _fitted(lambda eta: 1 - 4 * eta * eta, "dome")
+
+
+def _fitted(shape: Callable[[Array], Array], name: str) -> Section:
+    """The section of nine raised control points nearest to a symmetric shape in the mean square."""
+    eta = np.linspace(-0.5, 0.5, 201)
+    columns = np.stack([uniform_basis(eta, k) for k in range(-REACH, REACH + 1)], axis=1)
+    return Section(np.linalg.lstsq(columns, shape(eta), rcond=None)[0], name)
+
+
+def uniform_basis(eta: Array, k: int) -> Array:
+    """Uniform cubic B-spline centred k knots from the apex, on a section of twelve spans."""
+    x = np.abs(2 * (REACH + 2) * eta - k)
+    return np.where(x < 1, 2 / 3 - x * x + 0.5 * x**3, np.maximum(2 - x, 0.0) ** 3 / 6)
+
+
+SECTIONS: dict[str, Callable[[], Section]] = {"bell": bell, "cosine": cosine, "plateau": plateau, "dome": dome}
+"""The sections that have a name."""

@@ -18,7 +18,7 @@ class Settings:
     optimiser: str = _setting("auto", "name of an NLopt algorithm; auto: LD_SLSQP for residual, LN_BOBYQA for M")  # type: ignore[assignment]
     loss: str = _setting("tukey", "robust loss of the final fit: tukey, huber, cauchy, square")  # type: ignore[assignment]
     tuning: float = _setting(5.0, "tuning constant of the loss, in units of the noise scale")  # type: ignore[assignment]
-    section: str = _setting("auto", "cross-section: auto, bell, plateau")  # type: ignore[assignment]
+    section: str = _setting("auto", "cross-section: auto, bell, cosine, plateau, dome, learned")  # type: ignore[assignment]
     length: float = _setting(0.8, "length of a template")  # type: ignore[assignment]
     longest: float = _setting(2.0, "factor by which templates grow longer where the data are poor")  # type: ignore[assignment]
     wanted_error: float = _setting(0.08, "relative error of the width above which templates grow longer")  # type: ignore[assignment]

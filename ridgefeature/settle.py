@@ -10,7 +10,6 @@ from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_o
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.march import Track, reverse
-from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -114,9 +113,9 @@ def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:
     return limits_of(float(np.mean([t.height for t in near])), float(np.mean([t.width for t in near])), settings)
 
 
-def settle(window: Window, track: Track, section: Section, settings: Settings) -> Track:
-    """Refit every template with the trend of its neighbours and the given section."""
-    known = trends([t.changed(section=section) for t in track.templates])
+def settle(window: Window, track: Track, settings: Settings) -> Track:
+    """Refit every template with the trend of its neighbours."""
+    known = trends(list(track.templates))
     settings = settings.marching()
     fitted = [refine(window, t, _expected(known, i, settings), settings) for i, t in enumerate(known)]
     kept = [old if new.status in ("failed", "no data") else new for new, old in zip(fitted, known, strict=True)]
@@ -132,15 +131,10 @@ def prune(window: Window, track: Track, settings: Settings) -> Track:
         templates.pop(0)
     if len(templates) == len(track.templates):
         return track
-    return settle(window, place_ends(window, Track(tuple(templates), track.stop), settings), templates[0].section, settings)
+    return settle(window, place_ends(window, Track(tuple(templates), track.stop), settings), settings)
 
 
 def _stands(template: Template, settings: Settings) -> bool:
     return template.evidence >= settings.going_on and template.status != "no data" and bool(
         template.std is not None and np.isfinite(template.std).all()
     )
-
-
-def choose_section(window: Window, track: Track, settings: Settings) -> Section:
-    """The section that the ridge's points agree with best."""
-    return track.templates[0].section

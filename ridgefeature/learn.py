@@ -1,0 +1,128 @@
+"""Which cross-section the points of a whole ridge agree with: one that has a name, or one learned from them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.improve import limits_of, loss_of, refine
+from ridgefeature.kernels import residual as kernel
+from ridgefeature.section import REACH, SECTIONS, Section, bell, uniform_basis
+from ridgefeature.settings import Settings
+from ridgefeature.template import Template
+from ridgefeature.window import Window
+
+Array = NDArray[np.float64]
+
+CHOICES = ("auto", *SECTIONS, "learned")
+_MOST = 2000
+_PROBES = 6
+_NARROWER = (1.0, 0.9, 0.8, 0.7)
+"""Widths tried for a learned section, in widths of the section before it."""
+
+
+def first_section(settings: Settings) -> Section:
+    """The section to march with. Raises ValueError for an unknown `settings.section`."""
+    if settings.section not in CHOICES:
+        raise ValueError(f"section: expected one of {', '.join(CHOICES)}, got {settings.section!r}")
+    return SECTIONS.get(settings.section, bell)()
+
+
+def choose_section(window: Window, templates: tuple[Template, ...], settings: Settings) -> Section:
+    """The section that fits best; the templates' own unless another is better beyond doubt.
+
+    Doubt is settled by refitting a few templates with each named section, and with one learned from the residuals:
+    the likelihoods decide, with the Bayesian information criterion's price for what is learned.
+    """
+    current = templates[0].section
+    if settings.section in SECTIONS:
+        return current
+    eta, zeta, sigma = _collapsed(window, templates)
+    if len(eta) < 100:
+        return current
+    loss = _loss((zeta - current(eta)) / sigma, settings)
+    learned, found = _learned(eta, zeta, sigma, settings)
+    price = 0.5 * (REACH + 1) * np.log(len(eta))
+    if settings.section == "auto" and not found < loss - price - 0.02 * loss:
+        return current
+    probes = _probes(templates)
+    rivals = [*(make() for make in SECTIONS.values()), learned] if settings.section == "auto" else [learned]
+    losses = [_refitted(window, probes, section, settings) for section in rivals]
+    best = rivals[int(np.argmin(losses))]
+    again, _ = _learned(*_collapsed(window, _refits(window, probes, best, settings)), settings)
+    if settings.section == "learned" or _refitted(window, probes, again, settings) < min(losses) - price:
+        best = again
+    return best
+
+
+def with_section(template: Template, section: Section) -> Template:
+    """The template with another section and the width that keeps its width at half height."""
+    width = template.width * template.section.half_height_width / section.half_height_width
+    return template.changed(section=section, width=width, flank=template.flank * width / template.width)
+
+
+def _probes(templates: tuple[Template, ...]) -> tuple[Template, ...]:
+    """A few templates, spread evenly, without the ends where there are enough."""
+    inner = templates[1:-1] if len(templates) > _PROBES else templates
+    return tuple(inner[i] for i in np.linspace(0, len(inner) - 1, min(_PROBES, len(inner))).round().astype(int))
+
+
+def _refits(window: Window, probes: tuple[Template, ...], section: Section, settings: Settings) -> tuple[Template, ...]:
+    starts = [with_section(t, section) for t in probes]
+    return tuple(refine(window, t, limits_of(t.height, t.width, settings), settings) for t in starts)
+
+
+def _refitted(window: Window, probes: tuple[Template, ...], section: Section, settings: Settings) -> float:
+    """Loss of a few templates refitted with a section, each on the window and scale it had before."""
+    total = 0.0
+    for probe, fit in zip(probes, _refits(window, probes, section, settings), strict=True):
+        points = (window(probe) @ probe.rotation.T + (probe.position - fit.position)) @ fit.rotation
+        mean, _ = kernel.mean_loss(
+            points, fit.height, fit.width, fit.trend, section.table, probe.scale, *loss_of(settings)
+        )
+        total += len(points) * mean
+    return float(total)
+
+
+def _collapsed(window: Window, templates: tuple[Template, ...]) -> tuple[Array, Array, Array]:
+    """Points of all windows as y / width and z / height, with the noise scale in heights."""
+    rows = []
+    step = max(sum(t.points for t in templates) // _MOST, 1)
+    for t in templates:
+        x, y, z = window(t)[::step].T
+        bend, rise, widening = t.trend
+        y = y - 0.5 * bend * x * x / np.maximum(1 - bend * y, 0.2)
+        height = t.height + rise * x
+        width = np.maximum(t.width + widening * x, 0.1 * t.width)
+        slope = height / width * t.section(y / width, 1)
+        rows.append((y / width, z / height, np.abs(t.scale / height) * np.sqrt(1 + slope * slope)))
+    eta, zeta, sigma = (np.concatenate(column) for column in zip(*rows, strict=True))
+    return eta, zeta, sigma
+
+
+def _learned(eta: Array, zeta: Array, sigma: Array, settings: Settings) -> tuple[Section, float]:
+    """The symmetric section of nine raised control points that fits collapsed points best, and its loss.
+
+    Of the widths that do equally well the smallest is the one whose feet are where the ridge begins.
+    """
+    tried = [_fit(eta / factor, zeta, sigma, settings) for factor in _NARROWER]
+    best = min(loss for _, loss in tried)
+    raised, loss = [fit for fit in tried if fit[1] <= 1.01 * best + 2.0][-1]
+    return Section(raised, "learned"), loss
+
+
+def _fit(eta: Array, zeta: Array, sigma: Array, settings: Settings) -> tuple[Array, float]:
+    """Raised control points (9,), falling outwards, by reweighted least squares, and their loss."""
+    columns = np.stack([uniform_basis(eta, 0), *(uniform_basis(eta, k) + uniform_basis(eta, -k) for k in range(1, REACH + 1))], 1)
+    half = bell()(np.arange(REACH + 1) / (2 * REACH + 4))
+    for _ in range(3):
+        r = (zeta - columns @ half) / sigma
+        weight = np.maximum(1 - (r / settings.tuning) ** 2, 0.0) / sigma
+        half = np.linalg.lstsq(columns * weight[:, None], zeta * weight, rcond=None)[0]
+        half = np.minimum.accumulate(np.maximum(half, 0.0))
+        half = half if half[0] > 0 else bell()(np.arange(REACH + 1) / (2 * REACH + 4))
+    return np.concatenate([half[:0:-1], half]), _loss((zeta - columns @ half) / sigma, settings)
+
+
+def _loss(x: Array, settings: Settings) -> float:
+    return float(kernel.losses(x, *loss_of(settings)).sum())
