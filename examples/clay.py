@@ -25,12 +25,12 @@ def width(s: Array) -> Array:
 
 
 def main() -> None:
-    t = np.linspace(0.0, 1.0, 20_001)
+    t = np.linspace(0.0, 1.0, 2001)
     path = np.column_stack([80.0 * (t - 0.5), 22.0 * np.sin(7.0 * t) * (1 - 0.5 * t)])
     clay = Winding(path, height, width)
     scan = clay.points(n=10_000, region=100.0, noise=NOISE, seed=4)
 
-    ridge = rf.register(scan, at=(*path[6000], height(clay.arc_length[6000])))
+    ridge = rf.register(scan, at=(*path[600], height(clay.arc_length[600])))
 
     s, _ = clay.locate(ridge.spine[:, :2])
     covered = float((s.max() - s.min()) / clay.arc_length[-1])

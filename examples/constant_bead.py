@@ -28,7 +28,7 @@ def spread(name: str, values: NDArray[np.float64], std: NDArray[np.float64]) -> 
 
 
 def main() -> None:
-    x = np.linspace(-60.0, 60.0, 20_001)
+    x = np.linspace(-60.0, 60.0, 2001)
     s_shape = np.column_stack([x, 25.0 * np.sin(x / 20.0)])
     bead = Winding(s_shape, lambda s: HEIGHT + 0 * s, lambda s: WIDTH + 0 * s)
     scan = bead.points(n=200_000, region=140.0, noise=0.02)
