@@ -18,11 +18,11 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 _LADDER = 1.4
 _FEWEST = 30
-_FEWEST_TRIES = 3
+_FEWEST_TRIES = 2
 _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
-_ANGLES = np.arange(24) * (np.pi / 24)
-_OFFSETS = np.array([-0.4, -0.2, 0.0, 0.2, 0.4])
+_ANGLES = np.arange(16) * (np.pi / 16)
+_OFFSETS = np.array([-0.3, 0.0, 0.3])
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,13 @@ def first_section(settings: Settings) -> Section:
     return SECTIONS.get(settings.section, bell)()
 
 
+def in_doubt(misfit: Array) -> bool:
+    """Whether residuals (2, m) by distance from the spine differ from zero by more than chance: a chi-square test."""
+    count, total = misfit
+    square = float((total**2 / np.maximum(count, 1.0)).sum())
+    return square > len(count) + 6.0 * np.sqrt(2.0 * len(count))
+
+
 def choose_section(window: Window, templates: tuple[Template, ...], settings: Settings) -> Section:
     """The section that fits best; the templates' own unless another is better beyond doubt.
 

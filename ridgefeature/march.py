@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
-_ALIKE = math.cos(math.radians(5.0))
+_ALIKE = math.cos(math.radians(8.0))
+_HOPELESS = 3.0
+"""Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
 """A fit whose noise is this many times that of the template before it is suspect."""
 _LARGEST_TURN = np.radians(60.0)
@@ -31,6 +33,8 @@ class Track:
 
     templates: tuple[Template, ...]
     stop: tuple[str, str]
+    misfit: Array | None = None
+    """(2, m) number and sum of residuals by distance from the spine, once the track is settled."""
 
 
 def reverse(template: Template) -> Template:
@@ -74,14 +78,16 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
     return starts
 
 
-def _reject(fitted: Template, start: Template, settings: Settings) -> str:
-    """Why a fitted template is no continuation of its start; empty if it is one."""
+def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = False) -> str:
+    """Why a fitted template is no continuation of its start, beyond a gap or not; empty if it is one."""
     if fitted.points < FEWEST_POINTS or fitted.status == "no data":
         return "the data end here"
     if fitted.evidence < settings.going_on:
         return "no ridge: the data agree with a flat base"
     if fitted.height * start.height <= 0 or abs(fitted.height) > 2.5 * abs(start.height):
         return "no ridge: the height jumped"
+    if gap and (fitted.evidence < settings.evidence or not 0.5 < fitted.height / start.height < 2.0):
+        return "no ridge: what follows the gap is another one"
     if not 0.55 < fitted.width / start.width < 1.8:
         return "no ridge: the width jumped"
     local = start.rotation.T @ (fitted.position - start.position)
@@ -103,7 +109,7 @@ def _meets(template: Template, others: list[Template]) -> bool:
     return False
 
 
-def _fit_next(rough: Window, full: Window, chain: list[Template], settings: Settings
+def _fit_next(rough: Window, full: Window, chain: list[Template], gap: bool, settings: Settings
               ) -> tuple[Template, Template, str]:
     """Start and fit of the next template, and why it is none.
 
@@ -111,17 +117,31 @@ def _fit_next(rough: Window, full: Window, chain: list[Template], settings: Sett
     the other starts are tried, and last all points of the window instead of some; the best fit is kept.
     """
     starts = append(chain, settings)
-    if starts[0].rotation[:, 0] @ starts[1].rotation[:, 0] < _ALIKE if len(starts) > 1 else False:
+    starts, alike = _unlike(starts)
+    if len(starts) > 1:
         starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
     best: tuple[Template, Template, str] | None = None
-    for start, window in [*((s, rough) for s in starts), (starts[0], full)]:
+    tries = [*((s, rough) for s in starts), *((s, rough) for s in alike), (starts[0], full)]
+    for i, (start, window) in enumerate(tries):
+        if best is not None and i >= len(starts) and best[1].evidence < _HOPELESS:
+            break
         fitted = improve(window, start, settings)
-        why = _reject(fitted, start, settings)
+        why = _reject(fitted, start, settings, gap)
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
         if fitted.status == "no data" or (not why and fitted.scale < _WORSE * chain[-1].scale):
             break
     return best  # type: ignore[return-value]
+
+
+def _unlike(starts: list[Template]) -> tuple[list[Template], list[Template]]:
+    """The starts apart from those that face nearly as an earlier one does, and these."""
+    kept: list[Template] = []
+    alike: list[Template] = []
+    for start in starts:
+        same = any(start.rotation[:, 0] @ other.rotation[:, 0] >= _ALIKE for other in kept)
+        (alike if same else kept).append(start)
+    return kept, alike
 
 
 def march_one_way(rough: Window, full: Window, known: list[Template], found: list[Template], settings: Settings,
@@ -132,7 +152,7 @@ def march_one_way(rough: Window, full: Window, known: list[Template], found: lis
     """
     chain, reason, skipped = list(known), "", 0.0
     while len(known) + len(found) < settings.max_templates:
-        start, fitted, why = _fit_next(rough, full, chain, settings)
+        start, fitted, why = _fit_next(rough, full, chain, skipped > 0, settings)
         if why:
             reason = reason or why
             skipped += start.length

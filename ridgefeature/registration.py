@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.distance import sampling_floor
 from ridgefeature.grid import Grid, build_grid, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
-from ridgefeature.learn import choose_section, first_section, with_section
+from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
 from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
@@ -88,6 +88,8 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
     track = prune(full, settle(full, track, settings), settings)
+    if settings.section == "auto" and track.misfit is not None and not in_doubt(track.misfit):
+        return track
     section = choose_section(full, track.templates, settings)
     if section is track.templates[0].section:
         return track

@@ -16,6 +16,8 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 
+_BINS = 16
+
 
 def trends(templates: list[Template]) -> list[Template]:
     """Each template with the path's curvature and the slopes of height and width that its neighbours show."""
@@ -84,7 +86,10 @@ def _trim_end(window: Window, templates: list[Template], settings: Settings) -> 
                 return [*templates[:-2], _relength(inner, -0.5 * inner.length, max(end, 0.3 * inner.length))]
             templates = templates[:-1]
             continue
-        return [*templates[:-1], _relength(last, -0.5 * last.length, min(rest - 0.5 * last.length, last.length))]
+        # Where the last template stands it knows best how the ridge goes on.
+        own = _change_point(window, last, 2.0 * last.length, settings) if rest > 0.9 * last.length else None
+        high = max(rest - 0.5 * last.length, own or 0.0)
+        return [*templates[:-1], _relength(last, -0.5 * last.length, min(high, 1.2 * last.length))]
     return templates
 
 
@@ -119,7 +124,12 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     settings = settings.marching()
     fitted = [refine(window, t, _expected(known, i, settings), settings) for i, t in enumerate(known)]
     kept = [old if new.status in ("failed", "no data") else new for new, old in zip(fitted, known, strict=True)]
-    return Track(tuple(judge(window, t, settings) for t in kept), track.stop)
+    bins = np.zeros((2, _BINS))
+    judged = []
+    for t in kept:
+        judged.append(judge(window, t, settings))
+        kernel.add_misfit(bins, window(t), t.height, t.width, t.trend, t.section.table, t.scale or 1.0)
+    return Track(tuple(judged), track.stop, bins)
 
 
 def prune(window: Window, track: Track, settings: Settings) -> Track:

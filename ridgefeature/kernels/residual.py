@@ -285,6 +285,24 @@ def residuals(points, height, width, trend, table):
 
 
 @njit(**_OPTIONS)
+def add_misfit(bins, points, height, width, trend, table, scale):
+    """Add to bins (2, m) the number and the sum of clipped residuals, in scales, by distance from the spine.
+
+    The m bins share the distances up to the width. points (n, 3) in the template's frame.
+    """
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
+    per_bin = bins.shape[1] / width
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        r = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
+        k = int(abs(y) * per_bin)
+        if k < bins.shape[1]:
+            bins[0, k] += 1.0
+            bins[1, k] += min(max(r / scale, -2.0), 2.0)
+
+
+@njit(**_OPTIONS)
 def evidence(points, height, width, trend, table, scale, loss, tuning):
     """Twice the loss that a plane has more than the template; points (n, 3) in the template's frame."""
     bend, rise, widening = trend[0], trend[1], trend[2]
