@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import nlopt
@@ -62,26 +63,63 @@ def loss_of(settings: Settings) -> tuple[int, float]:
     return _LOSS[settings.loss], settings.tuning
 
 
-def _moved(template: Template, p: Array) -> Template:
-    """The template after increments p (8,) in its own frame."""
-    position, rotation = moved(template.position, template.rotation, p)
-    return template.changed(position=position, rotation=rotation, height=float(p[6]), width=float(p[7]))
+def _floor(template: Template) -> float:
+    return SMALLEST_SCALE * max(abs(template.height), 1e-3 * template.width)
 
 
-def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, float], tolerance: float,
-              limits: Limits, settings: Settings) -> tuple[Template, int, str]:
+def _minimise(points: Array, template: Template, loss: tuple[int, float], tolerance: float, limits: Limits,
+              settings: Settings) -> tuple[Template, int, str]:
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
-    table, trend = template.section.table, template.trend
+    table, trend, prior = template.section.table, template.trend, limits.prior
     h, w = template.height, template.width
-    transform = kernel.precondition(points, h, w, trend, table, scale, limits.prior[1])
-    start = np.array([0, 0, 0, 0, 0, 0, h, w])
+    scale, transform = kernel.prepare(points, h, w, trend, table, _floor(template), prior[1])
+    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, h, w])
     number, tuning = loss
+    objective = kernel.objective
 
     def value(q: Array, gradient: Array) -> float:
-        return float(kernel.objective(q, gradient, transform, start, limits.prior, trend, points, table, scale, number, tuning))
+        return objective(q, gradient, transform, start, prior, trend, points, table, scale, number, tuning)  # type: ignore[no-any-return]
 
-    name = "LD_SLSQP" if settings.optimiser == "auto" else settings.optimiser
-    optimiser = nlopt.opt(getattr(nlopt, name), 7)
+    return _run(value, template, start, transform, tolerance, limits, settings)
+
+
+def _minimise_distance(window: Window, template: Template, limits: Limits, settings: Settings
+                       ) -> tuple[Template, int, str]:
+    """The template after one optimisation of M (Eq. 3 and 4), its mean distance to the scan; as `_minimise`."""
+    h, w = template.height, template.width
+    scale, transform = kernel.prepare(
+        window(template), h, w, template.trend, template.section.table, _floor(template), limits.prior[1]
+    )
+    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, h, w])
+
+    def value(q: Array, _: Array) -> float:
+        return window.mean_distance(sample(_moved(template, start, transform, q)), settings.k) / scale
+
+    return _run(value, template, start, transform, 1e-3, limits, settings)
+
+
+def _moved(template: Template, start: Array, transform: Array, q: Array) -> Template:
+    position, rotation, height, width = moved(template.position, template.rotation, start, transform, q)
+    return template.changed(position=position, rotation=rotation, height=height, width=width)
+
+
+def sample(template: Template, along: int = 9, across: int = 21) -> Array:
+    """Points (along * across, 3) spread evenly over the patch, flanks included, in the frame of the scan."""
+    x = ((np.arange(along) + 0.5) / along - 0.5) * template.length
+    y = ((np.arange(across) + 0.5) / across * 2 - 1) * template.half_breadth
+    bend, rise, widening = template.trend
+    local = np.empty((along, across, 3))
+    local[..., 0] = x[:, None]
+    local[..., 1] = y + 0.5 * bend * x[:, None] ** 2
+    local[..., 2] = (template.height + rise * x[:, None]) * template.section(y / (template.width + widening * x[:, None]))
+    return template.position + local.reshape(-1, 3) @ template.rotation.T
+
+
+def _run(value: Callable[[Array, Array], float], template: Template, start: Array, transform: Array,
+         tolerance: float, limits: Limits, settings: Settings) -> tuple[Template, int, str]:
+    """Minimise value(q, gradient) from q = 0 within the limits: the template moved, evaluations and status."""
+    h, w = template.height, template.width
+    optimiser = nlopt.opt(getattr(nlopt, settings.algorithm), 7)
     optimiser.set_min_objective(value)
     low, high = np.full(7, -np.inf), np.full(7, np.inf)
     low[5], high[5] = (limits.lowest - h) / transform[6, 5], (limits.highest - h) / transform[6, 5]
@@ -90,21 +128,13 @@ def _minimise(points: Array, template: Template, scale: float, loss: tuple[int, 
     optimiser.set_upper_bounds(np.maximum(high, 0.0))
     optimiser.set_xtol_abs(tolerance)
     optimiser.set_ftol_rel(tolerance * tolerance)
-    optimiser.set_maxeval(settings.max_evaluations)
+    optimiser.set_maxeval(settings.max_evaluations * (1 if settings.algorithm.startswith("LD_") else 10))
     try:
         q = optimiser.optimize(np.zeros(7))
         status = "limit" if optimiser.last_optimize_result() == nlopt.MAXEVAL_REACHED else "converged"
     except (nlopt.RoundoffLimited, nlopt.runtime_error):
         return template, optimiser.get_numevals(), "failed"
-    return _moved(template, start + transform @ q), optimiser.get_numevals(), status
-
-
-def _scale(points: Array, template: Template) -> float:
-    """Robust standard deviation of the residuals."""
-    floor = SMALLEST_SCALE * max(abs(template.height), 1e-3 * template.width)
-    return float(kernel.robust_scale(
-        points, template.height, template.width, template.trend, template.section.table, floor
-    ))
+    return _moved(template, start, transform, q), optimiser.get_numevals(), status
 
 
 def sized(template: Template, settings: Settings) -> Template:
@@ -138,51 +168,67 @@ def improve(window: Window, start: Template, settings: Settings) -> Template:
     if len(points) < FEWEST_POINTS:
         return start.changed(status="no data", points=len(points), std=None)
     limits = limits_of(start.height, start.width, settings)
-    template, evaluations, status = _minimise(
-        points, start, _scale(points, start), _HUBER, _ROUGH, limits, settings
-    )
-    points = window(template)
-    if len(points) >= FEWEST_POINTS and abs(template.width / start.width - 1) < _AGREE:
-        scale = _scale(points, template)
-        _, far = kernel.mean_loss(
-            points, template.height, template.width, template.trend, template.section.table, scale, *_HUBER
-        )
-        if far < _FEW_OUTLIERS:
-            return _noted(points, template, scale, evaluations, status, settings)
+    if settings.measure == "M":
+        return _by_distance(window, start, limits, settings)
+    template, evaluations, status = _minimise(points, start, _HUBER, _ROUGH, limits, settings)
+    if abs(template.width / start.width - 1) < _AGREE:
+        points = window(template)
+        if len(points) >= FEWEST_POINTS:
+            noted, far = _noted(points, template, evaluations, status, settings)
+            if far < _FEW_OUTLIERS:
+                return noted
     return _rounds(window, template, limits, _ROUGH, _AGREE, evaluations, settings)
 
 
 def refine(window: Window, start: Template, limits: Limits, settings: Settings) -> Template:
     """Fit one template to the last digit, from a start near the optimum; never raises for not converging."""
+    if settings.measure == "M":
+        return _by_distance(window, start, limits, settings)
     return _rounds(window, start, limits, settings.tolerance, 0.02, 0, settings)
+
+
+def _by_distance(window: Window, template: Template, limits: Limits, settings: Settings) -> Template:
+    """The template fitted by M instead of by the residuals of the points."""
+    if len(window(template)) >= FEWEST_POINTS:
+        template, evaluations, status = _minimise_distance(window, template, limits, settings)
+        points = window(template)
+        if len(points) >= FEWEST_POINTS:
+            return _noted(points, template, evaluations, status, settings)[0]
+    return template.changed(status="no data", std=None)
 
 
 def _rounds(window: Window, template: Template, limits: Limits, tolerance: float, agree: float, evaluations: int,
             settings: Settings) -> Template:
-    loss = loss_of(settings)
+    """Optimise with the chosen loss on the window of the result, until window and width agree."""
     for _ in range(4):
         before = template.width
         points = window(template)
         if len(points) < FEWEST_POINTS:
             return template.changed(status="no data", points=len(points), std=None)
-        scale = _scale(points, template)
-        template, n, status = _minimise(points, template, scale, loss, tolerance, limits, settings)
+        template, n, status = _minimise(points, template, loss_of(settings), tolerance, limits, settings)
         evaluations += n
         if abs(template.width / before - 1) < agree:
             break
-    return _noted(points, template, scale, evaluations, status, settings)
+    points = window(template)
+    if len(points) < FEWEST_POINTS:
+        return template.changed(status="no data", points=len(points), std=None)
+    return _noted(points, template, evaluations, status, settings)[0]
 
 
-def _noted(points: Array, template: Template, scale: float, evaluations: int, status: str, settings: Settings
-           ) -> Template:
-    """The template with what its fit said. Misfit of a few per cent of the height is no evidence."""
-    contrast = max(scale, LEAST_CONTRAST * abs(template.height))
-    evidence = kernel.evidence(
-        points, template.height, template.width, template.trend, template.section.table, contrast,
-        *loss_of(settings),
+def _noted(points: Array, template: Template, evaluations: int, status: str, settings: Settings
+           ) -> tuple[Template, float]:
+    """The template with what its fit said, and the share of points far off.
+
+    Misfit of a few per cent of the height is no evidence.
+    """
+    scale, far, evidence = kernel.assess(
+        points, template.height, template.width, template.trend, template.section.table, _floor(template),
+        LEAST_CONTRAST * abs(template.height), *loss_of(settings),
     )
-    return template.changed(scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=float(evidence)
+    noted = template.changed(
+        scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence
     )
+    return noted, far
 
 
 def judge(window: Window, template: Template, settings: Settings) -> Template:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.distance import sampling_floor
 from ridgefeature.grid import Grid, build_grid, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
+from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
 from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
@@ -88,7 +89,8 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
     track = prune(full, settle(full, track, settings), settings)
-    if settings.section == "auto" and track.misfit is not None and not in_doubt(track.misfit):
+    settled = settings.measure == "M" or (track.misfit is not None and not in_doubt(track.misfit))
+    if settings.section == "auto" and settled:
         return track
     section = choose_section(full, track.templates, settings)
     if section is track.templates[0].section:
@@ -114,21 +116,11 @@ def _directed(track: Track, pick: Array, hints: Hints) -> Track:
 
 def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Template, ...]:
     """The templates with M, their mean distance to the scan, and what it would be for a perfect patch."""
-    along, across = (np.arange(6) + 0.5) / 6, (np.arange(12) + 0.5) / 6 - 1
-    samples, areas = [], []
-    for t in templates:
-        y = across * t.half_breadth
-        z = t.height * t.section(y / t.width)
-        local = np.empty((6, 12, 3))
-        local[..., 0] = ((along - 0.5) * t.length)[:, None]
-        local[..., 1] = y + 0.5 * t.trend[0] * local[..., 0] ** 2
-        local[..., 2] = z
-        samples.append(t.position + local.reshape(-1, 3) @ t.rotation.T)
-        areas.append(2 * t.half_breadth * t.length)
-    distances = nearest_distances(grid, np.concatenate(samples)).reshape(len(templates), -1).mean(axis=1)
+    distances = nearest_distances(grid, np.concatenate([sample(t, 6, 12) for t in templates]))
+    means = distances.reshape(len(templates), -1).mean(axis=1)
+    floors = [sampling_floor(max(t.points, 1) / (2 * t.half_breadth * t.length)) for t in templates]
     return tuple(
-        replace(t, M=float(m), M_floor=float(sampling_floor(max(t.points, 1) / area)))
-        for t, m, area in zip(templates, distances, areas, strict=True)
+        t.changed(M=float(m), M_floor=float(floor)) for t, m, floor in zip(templates, means, floors, strict=True)
     )
 
 

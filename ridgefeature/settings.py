@@ -2,46 +2,100 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from ridgefeature.section import SECTIONS
+
+MEASURES = ("residual", "M")
+LOSSES = ("tukey", "huber", "cauchy", "square")
+SECTION_CHOICES = ("auto", *SECTIONS, "learned")
 
 
-def _setting(default: float | int | str | bool, text: str) -> object:
-    return field(default=default, metadata={"help": text})
+def _setting(default: Any, text: str, choices: tuple[str, ...] = ()) -> Any:
+    return field(default=default, metadata={"help": text, "choices": choices})
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Tunables; lengths are parts of the local width unless said otherwise."""
+    """Tunables; lengths are parts of the local width unless said otherwise.
 
-    measure: str = _setting("residual", "what a template minimises: residual, or M for the paper's mean distance")  # type: ignore[assignment]
-    k: int = _setting(2, "nearest points averaged in M")  # type: ignore[assignment]
-    optimiser: str = _setting("auto", "name of an NLopt algorithm; auto: LD_SLSQP for residual, LN_BOBYQA for M")  # type: ignore[assignment]
-    loss: str = _setting("tukey", "robust loss of the final fit: tukey, huber, cauchy, square")  # type: ignore[assignment]
-    tuning: float = _setting(5.0, "tuning constant of the loss, in units of the noise scale")  # type: ignore[assignment]
-    section: str = _setting("auto", "cross-section: auto, bell, cosine, plateau, dome, learned")  # type: ignore[assignment]
-    length: float = _setting(0.8, "length of a template")  # type: ignore[assignment]
-    longest: float = _setting(2.0, "factor by which templates grow longer where the data are poor")  # type: ignore[assignment]
-    wanted_error: float = _setting(0.08, "relative error of the width above which templates grow longer")  # type: ignore[assignment]
-    flank: float = _setting(0.3, "breadth of each flat flank")  # type: ignore[assignment]
-    border: float = _setting(0.5, "breadth of the finished surface outside each foot")  # type: ignore[assignment]
-    max_evaluations: int = _setting(80, "evaluations allowed for one optimisation")  # type: ignore[assignment]
-    tolerance: float = _setting(1e-5, "step that ends an optimisation, in units of one noise scale")  # type: ignore[assignment]
-    march_width_change: float = _setting(1.5, "largest factor by which the width may change from template to template")  # type: ignore[assignment]
-    march_height_change: float = _setting(2.0, "largest factor by which the height may rise from template to template")  # type: ignore[assignment]
-    drift: float = _setting(0.25, "relative change of the width between templates that is expected; of the height, twice")  # type: ignore[assignment]
-    width_change: float = _setting(2.0, "largest factor by which one fit may change the width")  # type: ignore[assignment]
-    flips: bool = _setting(True, "let a fit turn a ridge into a groove")  # type: ignore[assignment]
-    height_change: float = _setting(4.0, "largest factor by which one fit may raise the height")  # type: ignore[assignment]
-    evidence: float = _setting(25.0, "log likelihood ratio, doubled, above which a first window holds a ridge")  # type: ignore[assignment]
-    going_on: float = _setting(20.0, "the same for a window in which a known ridge is expected to go on")  # type: ignore[assignment]
-    look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")  # type: ignore[assignment]
-    max_templates: int = _setting(500, "templates in all")  # type: ignore[assignment]
+    Raises ValueError for a value that is unknown, not finite or out of range.
+    """
+
+    measure: str = _setting(
+        "residual", "what a template minimises: residual, or M for the paper's mean distance", MEASURES
+    )
+    k: int = _setting(2, "nearest points averaged in M")
+    optimiser: str = _setting(
+        "auto", "name of a local NLopt algorithm; auto: LD_LBFGS for residual, LN_BOBYQA for M"
+    )
+    loss: str = _setting("tukey", "robust loss of the final fit", LOSSES)
+    tuning: float = _setting(5.0, "tuning constant of the loss, in units of the noise scale")
+    section: str = _setting("auto", "cross-section", SECTION_CHOICES)
+    length: float = _setting(0.8, "length of a template")
+    longest: float = _setting(2.0, "factor by which templates grow longer where the data are poor")
+    wanted_error: float = _setting(0.08, "relative error of the width above which templates grow longer")
+    flank: float = _setting(0.3, "breadth of each flat flank that is fitted")
+    border: float = _setting(0.5, "breadth of the finished surface outside each foot")
+    max_evaluations: int = _setting(80, "evaluations allowed for one optimisation; ten times that for M")
+    tolerance: float = _setting(1e-4, "step that ends an optimisation, in units of one noise scale")
+    march_width_change: float = _setting(1.5, "largest factor by which the width may change from template to template")
+    march_height_change: float = _setting(2.0, "largest factor by which the height may rise from template to template")
+    drift: float = _setting(
+        0.25, "relative change of the width between templates that is expected; of the height, twice"
+    )
+    width_change: float = _setting(2.0, "largest factor by which the first fit may change the width")
+    height_change: float = _setting(4.0, "largest factor by which the first fit may raise the height")
+    flips: bool = _setting(True, "let the first fit turn a ridge into a groove")
+    evidence: float = _setting(25.0, "log likelihood ratio, doubled, above which a first window holds a ridge")
+    going_on: float = _setting(20.0, "the same for a window in which a known ridge is expected to go on")
+    look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")
+    max_templates: int = _setting(500, "templates in all")
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value, default = getattr(self, f.name), f.default
+            if f.metadata["choices"]:
+                _check(value in f.metadata["choices"], f.name, f"one of {', '.join(f.metadata['choices'])}", value)
+            elif isinstance(default, bool):
+                _check(isinstance(value, bool), f.name, "True or False", value)
+            elif isinstance(default, int):
+                _check(isinstance(value, int) and value >= 1, f.name, "a whole number above 0", value)
+            elif isinstance(default, float):
+                _check(_is_positive(value), f.name, "a number above 0", value)
+        for name in ("longest", "width_change", "march_width_change", "height_change", "march_height_change"):
+            _check(getattr(self, name) >= 1, name, "a factor of at least 1", getattr(self, name))
+        _check(self.border > 0.1, "border", "more than 0.1", self.border)
+        self._check_optimiser()
+
+    def _check_optimiser(self) -> None:
+        import nlopt
+
+        known = self.optimiser == "auto" or (
+            self.optimiser.startswith(("LD_", "LN_")) and isinstance(getattr(nlopt, self.optimiser, None), int)
+        )
+        _check(known, "optimiser", "auto or a local NLopt algorithm such as LD_SLSQP or LN_BOBYQA", self.optimiser)
+        derivative_free = self.measure == "residual" or not self.optimiser.startswith("LD_")
+        _check(derivative_free, "optimiser", "auto or an LN_ algorithm for measure M, which has no gradient", self.optimiser)
+
+    @property
+    def algorithm(self) -> str:
+        """The NLopt algorithm in use."""
+        if self.optimiser != "auto":
+            return self.optimiser
+        return "LN_BOBYQA" if self.measure == "M" else "LD_LBFGS"
 
     def marching(self) -> Settings:
         """The settings for a template whose neighbour is known."""
         return replace(self, width_change=self.march_width_change, height_change=self.march_height_change, flips=False)
 
-    @classmethod
-    def names(cls) -> list[str]:
-        """Names of all settings."""
-        return [f.name for f in fields(cls)]
+
+def _is_positive(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0
+
+
+def _check(good: bool, name: str, expected: str, got: Any) -> None:
+    if not good:
+        raise ValueError(f"setting {name}: expected {expected}, got {got!r}")

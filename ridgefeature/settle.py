@@ -122,13 +122,13 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     """Refit every template with the trend of its neighbours."""
     known = trends(list(track.templates))
     settings = settings.marching()
-    fitted = [refine(window, t, _expected(known, i, settings), settings) for i, t in enumerate(known)]
-    kept = [old if new.status in ("failed", "no data") else new for new, old in zip(fitted, known, strict=True)]
     bins = np.zeros((2, _BINS))
     judged = []
-    for t in kept:
-        judged.append(judge(window, t, settings))
-        kernel.add_misfit(bins, window(t), t.height, t.width, t.trend, t.section.table, t.scale or 1.0)
+    for i, template in enumerate(known):
+        new = refine(window, template, _expected(known, i, settings), settings)
+        new = judge(window, template if new.status in ("failed", "no data") else new, settings)
+        kernel.add_misfit(bins, window(new), new.height, new.width, new.trend, new.section.table, new.scale or 1.0)
+        judged.append(new)
     return Track(tuple(judged), track.stop, bins)
 
 

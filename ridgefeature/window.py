@@ -13,7 +13,8 @@ from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
 
-_MARGIN = 1.25
+_MARGIN = 0.2
+"""How much wider than asked a look-up is, in half breadths: enough for a window that turns and shifts a little."""
 
 
 @dataclass(eq=False)
@@ -43,7 +44,8 @@ class Window:
             if covered:
                 return found
         centre = template.position + 0.5 * (low + high) * template.rotation[:, 0]
-        half = _MARGIN * np.array([0.5 * (high - low), half_y, half_z])
+        half = np.array([0.5 * (high - low), half_y, half_z])
+        half = 1.1 * half + _MARGIN * half_y
         self._look_up(centre, template.rotation, half)
         return select(self._points, centre, template.rotation, half, *box)[0]
 

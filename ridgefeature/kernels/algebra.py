@@ -85,20 +85,24 @@ def whitening(normal):
 
 
 @njit(cache=True)
-def moved(position, rotation, p):
-    """Position (3,) and rotation (3, 3) after increments p (8,) in the frame they make."""
+def moved(position, rotation, start, transform, q):
+    """Position (3,), rotation (3, 3), height and width at start + transform @ q, increments in the given frame."""
+    p = start.copy()
+    for i in range(8):
+        for j in range(q.size):
+            p[i] += transform[i, j] * q[j]
     turn, _ = rotation_of(p[3:6])
-    turned = np.zeros((3, 3))
+    turned_axes = np.zeros((3, 3))
     place = position.copy()
     for i in range(3):
         for j in range(3):
             place[i] += rotation[i, j] * p[j]
             for k in range(3):
-                turned[i, j] += rotation[i, k] * turn[k, j]
+                turned_axes[i, j] += rotation[i, k] * turn[k, j]
     # Gram-Schmidt keeps long chains of products orthonormal.
     out = np.empty((3, 3))
     for j in range(3):
-        column = turned[:, j].copy()
+        column = turned_axes[:, j].copy()
         for k in range(j):
             dot = column[0] * out[0, k] + column[1] * out[1, k] + column[2] * out[2, k]
             for i in range(3):
@@ -106,7 +110,7 @@ def moved(position, rotation, p):
         size = math.sqrt(column[0] ** 2 + column[1] ** 2 + column[2] ** 2)
         for i in range(3):
             out[i, j] = column[i] / size
-    return place, out
+    return place, out, p[6], p[7]
 
 
 @njit(cache=True)

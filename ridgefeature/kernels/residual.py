@@ -261,6 +261,21 @@ def precondition(points, height, width, trend, table, scale, prior_weight):
 
 
 @njit(**_OPTIONS)
+def prepare(points, height, width, trend, table, floor, prior_weight):
+    """Robust scale and whitening transform of a template as it stands."""
+    scale = robust_scale(points, height, width, trend, table, floor)
+    return scale, precondition(points, height, width, trend, table, scale, prior_weight)
+
+
+@njit(**_OPTIONS)
+def assess(points, height, width, trend, table, floor, contrast, loss, tuning):
+    """Robust scale, share of points beyond three scales, and evidence at no less than the scale `contrast`."""
+    scale = robust_scale(points, height, width, trend, table, floor)
+    far = mean_loss(points, height, width, trend, table, scale, HUBER, tuning)[1]
+    return scale, far, evidence(points, height, width, trend, table, max(scale, contrast), loss, tuning)
+
+
+@njit(**_OPTIONS)
 def mean_loss(points, height, width, trend, table, scale, loss, tuning):
     """Mean robust loss of a template as it stands, and the share of points beyond three scales."""
     bend, rise, widening = trend[0], trend[1], trend[2]
