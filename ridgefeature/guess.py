@@ -18,6 +18,8 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 _LADDER = 1.4
 _FEWEST = 30
+_PAST_BEST = 3
+"""Widths in a row that explain far less than a smaller one did, after which still larger ones are not tried."""
 _FEWEST_TRIES = 2
 _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
@@ -83,13 +85,16 @@ def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: S
     radius, last = 3.0 * window.spacing, extent / 2.7
     if hints.width is not None:
         radius = last = 1.1 * hints.width
-    starts, frame = [], np.eye(3)
-    while radius <= last * (1 + 1e-9):
+    starts: list[tuple[float, Template]] = []
+    frame, falling = np.eye(3), 0
+    while radius <= last * (1 + 1e-9) and falling < _PAST_BEST:
         points = window.around(pick, radius, frame)
         if len(points) >= _FEWEST:
             frame = _frame(points)
             start = _start(points, frame, radius / 1.1, pick, hints, section, settings)
             if start is not None:
+                most = max((score for score, _ in starts), default=0.0)
+                falling = falling + 1 if most > _CLEAR and start[0] < 0.4 * most else 0
                 starts.append(start)
         radius *= _LADDER
     return sorted(starts, key=lambda pair: -pair[0])

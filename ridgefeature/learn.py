@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _MOST = 2000
 _PROBES = 6
+_SMALLEST_SHIFT = 0.01
+_MUCH_BETTER = 0.8
 _NARROWER = (1.0, 0.9, 0.8, 0.7)
 """Widths tried for a learned section, in widths of the section before it."""
 
@@ -25,11 +27,16 @@ def first_section(settings: Settings) -> Section:
     return SECTIONS.get(settings.section, bell)()
 
 
-def in_doubt(misfit: Array) -> bool:
-    """Whether residuals (2, m) by distance from the spine differ from zero by more than chance: a chi-square test."""
+def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:
+    """Whether residuals (2, m) by distance from the spine differ from zero, by more than chance and by enough.
+
+    More than chance: a chi-square test. Enough: one per cent of the height somewhere.
+    """
     count, total = misfit
     square = float((total**2 / np.maximum(count, 1.0)).sum())
-    return square > len(count) + 6.0 * np.sqrt(2.0 * len(count))
+    noise = float(np.median([t.scale / abs(t.height) for t in templates]))
+    shift = float(np.abs(total / np.maximum(count, 30.0)).max()) * noise
+    return square > len(count) + 6.0 * np.sqrt(2.0 * len(count)) and shift > _SMALLEST_SHIFT
 
 
 def choose_section(window: Window, templates: tuple[Template, ...], settings: Settings) -> Section:
@@ -50,12 +57,16 @@ def choose_section(window: Window, templates: tuple[Template, ...], settings: Se
     if settings.section == "auto" and not found < loss - price - 0.02 * loss:
         return current
     probes = _probes(templates)
-    rivals = [*(make() for make in SECTIONS.values()), learned] if settings.section == "auto" else [learned]
-    losses = [_refitted(window, probes, section, settings) for section in rivals]
-    best = rivals[int(np.argmin(losses))]
+    named = [make() for make in SECTIONS.values()]
+    losses = [_refitted(window, probes, section, settings) for section in named]
+    best, least = named[int(np.argmin(losses))], min(losses)
+    if settings.section == "learned":
+        best, least = learned, np.inf
     again, _ = _learned(*_collapsed(window, _refits(window, probes, best, settings)), settings)
-    if settings.section == "learned" or _refitted(window, probes, again, settings) < min(losses) - price:
-        best = again
+    for section in (learned, again):
+        loss = _refitted(window, probes, section, settings)
+        if loss < _MUCH_BETTER * least - price:
+            best, least = section, loss
     return best
 
 

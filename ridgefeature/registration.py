@@ -66,7 +66,7 @@ def register(
     spacing = typical_spacing(grid)
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
     _check_pick(grid, pick, spacing, extent)
-    rough, full = Window(grid, spacing, _ROUGH_POINTS), Window(grid, spacing)
+    rough, full = Window(grid, spacing, _ROUGH_POINTS, margin=0.2), Window(grid, spacing)
     track = _track(rough, full, pick, extent, hints, settings, progress)
     track = _directed(track, pick, hints)
     templates = _with_distances(track.templates, grid)
@@ -89,7 +89,7 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
     track = prune(full, settle(full, track, settings), settings)
-    settled = settings.measure == "M" or (track.misfit is not None and not in_doubt(track.misfit))
+    settled = settings.measure == "M" or (track.misfit is not None and not in_doubt(track.misfit, track.templates))
     if settings.section == "auto" and settled:
         return track
     section = choose_section(full, track.templates, settings)

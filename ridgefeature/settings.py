@@ -40,7 +40,7 @@ class Settings:
     flank: float = _setting(0.3, "breadth of each flat flank that is fitted")
     border: float = _setting(0.5, "breadth of the finished surface outside each foot")
     max_evaluations: int = _setting(80, "evaluations allowed for one optimisation; ten times that for M")
-    tolerance: float = _setting(1e-4, "step that ends an optimisation, in units of one noise scale")
+    tolerance: float = _setting(1e-3, "step that ends an optimisation, in units of one noise scale")
     march_width_change: float = _setting(1.5, "largest factor by which the width may change from template to template")
     march_height_change: float = _setting(2.0, "largest factor by which the height may rise from template to template")
     drift: float = _setting(

@@ -13,8 +13,6 @@ from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
 
-_MARGIN = 0.2
-"""How much wider than asked a look-up is, in half breadths: enough for a window that turns and shifts a little."""
 
 
 @dataclass(eq=False)
@@ -25,6 +23,8 @@ class Window:
     spacing: float
     most: int = 3000
     """Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
+    margin: float = 0.1
+    """How much wider than asked a look-up is, in half breadths, so that a window may turn and shift a little."""
     _held: tuple[Array, Array, Array] | None = field(default=None, init=False)
     _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
 
@@ -45,7 +45,7 @@ class Window:
                 return found
         centre = template.position + 0.5 * (low + high) * template.rotation[:, 0]
         half = np.array([0.5 * (high - low), half_y, half_z])
-        half = 1.1 * half + _MARGIN * half_y
+        half = (1.0 + 0.5 * self.margin) * half + self.margin * half_y
         self._look_up(centre, template.rotation, half)
         return select(self._points, centre, template.rotation, half, *box)[0]
 
