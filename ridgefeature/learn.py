@@ -9,6 +9,7 @@ from ridgefeature.improve import limits_of, loss_of, refine
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.section import REACH, SECTIONS, Section, bell, uniform_basis
 from ridgefeature.settings import Settings
+from ridgefeature.settle import misfit_scale
 from ridgefeature.template import Template
 from ridgefeature.window import Window
 
@@ -34,7 +35,7 @@ def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:
     """
     count, total = misfit
     square = float((total**2 / np.maximum(count, 1.0)).sum())
-    noise = float(np.median([t.scale / abs(t.height) for t in templates]))
+    noise = float(np.median([misfit_scale(t) / abs(t.height) for t in templates]))
     shift = float(np.abs(total / np.maximum(count, 30.0)).max()) * noise
     return square > len(count) + 6.0 * np.sqrt(2.0 * len(count)) and shift > _SMALLEST_SHIFT
 

@@ -127,9 +127,14 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     for i, template in enumerate(known):
         new = refine(window, template, _expected(known, i, settings), settings)
         new = judge(window, template if new.status in ("failed", "no data") else new, settings)
-        kernel.add_misfit(bins, window(new), new.height, new.width, new.trend, new.section.table, new.scale or 1.0)
+        kernel.add_misfit(bins, window(new), new.height, new.width, new.trend, new.section.table, misfit_scale(new))
         judged.append(new)
     return Track(tuple(judged), track.stop, bins)
+
+
+def misfit_scale(template: Template) -> float:
+    """Unit of the residuals that tell a wrong section: the noise, but no less than two per cent of the height."""
+    return max(template.scale, 0.02 * abs(template.height), 1e-300)
 
 
 def prune(window: Window, track: Track, settings: Settings) -> Track:

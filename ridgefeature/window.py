@@ -23,7 +23,7 @@ class Window:
     spacing: float
     most: int = 3000
     """Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
-    margin: float = 0.1
+    margin: float = 0.15
     """How much wider than asked a look-up is, in half breadths, so that a window may turn and shift a little."""
     _held: tuple[Array, Array, Array] | None = field(default=None, init=False)
     _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
