@@ -18,14 +18,14 @@ from ridgefeature import plot
 
 FOLDER = Path(__file__).parent
 sys.path.insert(0, str(FOLDER.parent / "examples"))
-PICK = (17429, 19603, 518)
+PICK = (20558, 740, 508)
 
 
 def shrink(source: Path, target: Path, width: int, colours: int) -> None:
     """A copy of a picture that is `width` pixels wide, with few colours."""
     picture = Image.open(source).convert("RGB")
     size = width, round(picture.height * width / picture.width)
-    small = picture.resize(size, Image.Resampling.LANCZOS).quantize(colours, dither=Image.Dither.NONE)
+    small = picture.resize(size, Image.Resampling.LANCZOS).quantize(colours, Image.Quantize.FASTOCTREE)
     small.save(target, optimize=True)
     print(target.name, target.stat().st_size // 1000, "kB")
 
@@ -39,8 +39,8 @@ def main() -> None:
         folder = Path(name)
         plot.view(scan, ridge, folder / "view.png")
         plot.profile(ridge, folder / "profile.png", scan)
-        shrink(folder / "view.png", FOLDER / "view.png", 1300, 128)
-        shrink(folder / "profile.png", FOLDER / "profile.png", 1200, 64)
+        shrink(folder / "view.png", FOLDER / "view.png", 1300, 256)
+        shrink(folder / "profile.png", FOLDER / "profile.png", 1200, 128)
 
 
 if __name__ == "__main__":
