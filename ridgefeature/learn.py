@@ -105,7 +105,9 @@ def _collapsed(window: Window, templates: tuple[Template, ...]) -> tuple[Array, 
     rows = []
     step = max(sum(t.points for t in templates) // _MOST, 1)
     for t in templates:
-        x, y, z = window(t)[::step].T
+        points = window(t)
+        # By x, so that the choice does not depend on how the scan is turned.
+        x, y, z = points[np.argsort(points[:, 0], kind="stable")[::step]].T
         bend, rise, widening = t.trend
         y = y - 0.5 * bend * x * x / np.maximum(1 - bend * y, 0.2)
         height = t.height + rise * x

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.distance import sampling_floor
-from ridgefeature.grid import Grid, build_grid, nearest_distance, nearest_distances, typical_spacing
+from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
@@ -25,6 +25,7 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 KINDS = ("ridge", "groove", "auto")
 _ROUGH_POINTS = 400
+_NEAR = 100
 
 
 class NoRidgeError(ValueError):
@@ -58,12 +59,14 @@ def register(
     pick = _vector(at, "at")
     hints = _hints(direction, width, height, kind)
     settings = settings or Settings()
+    if not isinstance(settings, Settings):
+        raise ValueError(f"settings: expected a Settings, got {type(settings).__name__}; write Settings(name=value)")
     if max_templates is not None:
         settings = replace(settings, max_templates=_positive(max_templates, "max_templates", whole=True))
     if roi is not None:
         scan = scan.crop(pick, _positive(roi, "roi"))
     grid = build_grid(scan.points)
-    spacing = typical_spacing(grid)
+    spacing = _spacing(grid, pick)
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
     _check_pick(grid, pick, spacing, extent)
     rough, full = Window(grid, spacing, _ROUGH_POINTS, margin=0.2), Window(grid, spacing)
@@ -86,6 +89,7 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
             f"no ridge at {_text(pick)}: the points around it agree with a flat base (evidence {found}, needed "
             f"{settings.evidence:g}); pick a point on the ridge, or give direction=, width= and height= as a start"
         )
+    first = _canonical(full, first, pick, hints)
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
     track = prune(full, settle(full, track, settings), settings)
@@ -99,6 +103,18 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     # The ends move with the section: settled once, they are placed again.
     track = settle(full, Track(templates, track.stop), settings)
     return settle(full, place_ends(full, track, settings), settings)
+
+
+def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:
+    """The first template the way up that its kind asks for, and facing where the ridge rises.
+
+    Neither depends on how the scan is turned: a ridge and a groove differ by the side that is called up, and a
+    march both ways would else start either way.
+    """
+    if hints.kind != "auto" and (first.height < 0) != (hints.kind == "groove"):
+        first = first.changed(rotation=first.rotation * np.array([1.0, -1.0, -1.0]), height=-first.height)
+    x, _, z = window(first).T
+    return reverse(first) if x @ z * first.height < 0 else first
 
 
 def _directed(track: Track, pick: Array, hints: Hints) -> Track:
@@ -122,6 +138,13 @@ def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Templa
     return tuple(
         t.changed(M=float(m), M_floor=float(floor)) for t, m, floor in zip(templates, means, floors, strict=True)
     )
+
+
+def _spacing(grid: Grid, pick: Array) -> float:
+    """Median distance between neighbours among the points about the pick: the same however the scan is turned."""
+    near = nearest(grid, pick[None], min(_NEAR, len(grid.points)))[1][0]
+    apart = nearest_distances(grid, near, 2)[:, 1]
+    return float(np.median(apart[apart > 0])) if (apart > 0).any() else typical_spacing(grid)
 
 
 def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.bspline import Surface
 from ridgefeature.merge import LEAST_BORDER, along, merged_surface
-from ridgefeature.scan import Scan, Source, as_scan
+from ridgefeature.scan import Scan, Source
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
@@ -40,6 +40,14 @@ class Ridge(Stations):
     pick: Array = field(default_factory=lambda: np.zeros(3))
     settings: Settings = field(default_factory=Settings)
     source: Source | None = None
+
+    def __post_init__(self) -> None:
+        for f in fields(Stations):
+            array = getattr(self, f.name)
+            if array.flags.writeable:
+                array = np.array(array, dtype=np.float64)
+                array.setflags(write=False)
+                object.__setattr__(self, f.name, array)
 
     @property
     def half_height_width(self) -> Array:
@@ -103,9 +111,12 @@ class Ridge(Stations):
             raise ValueError(f"expected either the rate {rate_name} or the absolute {name}, got both; drop one")
         if absolute is not None:
             wanted = absolute(self.arc_length) if callable(absolute) else absolute
-            goal = np.broadcast_to(_finite(wanted, name), old.shape)
+            values = _finite(wanted, name)
+            if values.shape not in ((), old.shape):
+                raise ValueError(f"{name}: expected one number or {old.size}, one a station, got shape {values.shape}")
+            goal = np.broadcast_to(values, old.shape)
         elif rate is not None:
-            goal = old * float(_finite(rate, rate_name))
+            goal = old * float(_finite(rate, rate_name, ()))
         else:
             return old, np.ones_like(old)
         new = old + blend * (goal - old)
@@ -114,10 +125,17 @@ class Ridge(Stations):
     def _blend(self, between: tuple[float, float] | None) -> Array:
         if between is None:
             return np.ones_like(self.arc_length)
-        low, high = (float(x) for x in _finite(between, "between"))
+        low, high = (float(x) for x in _finite(between, "between", (2,)))
         if not 0 <= low < high <= self.length * (1 + 1e-12):
             raise ValueError(
                 f"between: expected 0 <= s0 < s1 <= {self.length:g}, the ridge's arc length, got ({low:g}, {high:g})"
+            )
+        inside = (self.arc_length > low) & (self.arc_length < high)
+        if inside.sum() < 3:
+            step = float(self.arc_length[1])
+            raise ValueError(
+                f"between: expected a stretch of three stations or more, which are {step:.4g} apart, "
+                f"got {high - low:.4g}; choose a longer one"
             )
         ramp = min((high - low) / 3, float(np.median(self.width)))
         # An end of the ridge needs no ramp: there is nothing beyond it to blend with.
@@ -131,7 +149,7 @@ class Ridge(Stations):
 
         From border to border, with the rates h and w applied. Raises ValueError for s off the ridge or n < 2.
         """
-        if not 0 <= float(_finite(s, "s")) <= self.length * (1 + 1e-12):
+        if not 0 <= float(_finite(s, "s", ())) <= self.length * (1 + 1e-12):
             raise ValueError(f"s: expected an arc length from 0 to {self.length:g}, got {s:g}")
         if n < 2:
             raise ValueError(f"n: expected at least 2 points, got {n}")
@@ -150,9 +168,11 @@ class Ridge(Stations):
     def distance(self, scan: Scan | ArrayLike) -> Array:
         """Signed distance (n,) of scan points to the finished surface, positive on the side of the normal.
 
-        NaN for points whose foot lies beyond the surface's border.
+        NaN for points whose foot lies beyond the surface's border, and for points that are NaN.
         """
-        points = scan.points if isinstance(scan, Scan) else as_scan(scan, self.unit).points
+        points = np.asarray(scan.points if isinstance(scan, Scan) else scan, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError(f"scan: expected points of shape (n, 3), got shape {points.shape}")
         return self.surface().project(points)[2]
 
     def save(self, path: Any) -> None:
@@ -184,11 +204,14 @@ class Ridge(Stations):
         }
 
 
-def _finite(value: Any, name: str) -> Array:
+def _finite(value: Any, name: str, shape: tuple[int, ...] | None = None) -> Array:
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         array = np.array(np.nan)
+    if shape is not None and array.shape != shape and np.isfinite(array).all():
+        what = "one number" if shape == () else f"{shape[0]} numbers"
+        raise ValueError(f"{name}: expected {what}, got {value!r}")
     if not np.isfinite(array).all():
         raise ValueError(f"{name}: expected finite numbers, got {value!r}")
     return array

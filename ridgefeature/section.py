@@ -84,17 +84,13 @@ def _table(raised: Array) -> Array:
 
 
 def _largest(table: Array) -> float:
-    x = np.linspace(0.0, 1.0, 65)
-    values = table @ np.vander(x, 4, increasing=True).T
-    span, k = np.unravel_index(np.argmax(values), values.shape)
-    a, b, c, d = table[span]
-    t = x[k]
-    for _ in range(8):
-        second = 2 * c + 6 * d * t
-        if second >= 0:
-            break
-        t = min(max(t - (b + t * (2 * c + t * 3 * d)) / second, 0.0), 1.0)
-    return float(a + t * (b + t * (c + t * d)))
+    """The largest height: at a knot, or where the slope of a span's cubic is zero."""
+    best = float(table[:, 0].max())
+    for a, b, c, d in table:
+        for t in np.roots(np.trim_zeros([3 * d, 2 * c, b], "f")) if (b or c or d) else ():
+            if abs(t.imag) < 1e-6 and 0 < t.real < 1:
+                best = max(best, float(a + t.real * (b + t.real * (c + t.real * d))))
+    return best
 
 
 @lru_cache(maxsize=1)

@@ -127,11 +127,15 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     std = np.array([(q.std[6], q.std[7]) if q.std is not None else (np.inf, np.inf) for q in templates])
     widths = np.array([q.width for q in templates])
     width = np.maximum(spread @ widths, 0.25 * widths.min())
+    heights = np.array([q.height for q in templates])
+    # Beyond the last centres both go on straight, but neither vanishes nor changes its sign.
+    sign = 1.0 if np.median(heights) > 0 else -1.0
+    height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
     height_std, width_std = np.sqrt(spread**2 @ std**2).T
     curvature = np.interp(s, at, [abs(q.trend[0]) for q in templates])
     border = np.minimum((0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width))
     return Stations(
         arc_length=s, spine=path(t), tangent=tangent, normal=normal,
-        height=spread @ np.array([q.height for q in templates]), width=width,
+        height=height, width=width,
         height_std=height_std, width_std=width_std, border=border,
     )

@@ -184,9 +184,6 @@ def test_numbers_that_are_not_finite_are_refused_where_shape_depends_on_them(rid
             from_document(document)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="templates are not checked: shapes, None and words pass, and fail in use"
-)
 @pytest.mark.parametrize(
     ("name", "value"), [("position", 7), ("rotation", [1, 2]), ("std", [1.0]), ("scale", None), ("M", "x")]
 )
@@ -197,7 +194,6 @@ def test_templates_of_the_wrong_shape_are_refused(ridge, name, value):
         from_document(document)
 
 
-@pytest.mark.xfail(strict=True, reason="a feature with no template is read, and its summary is NaN")
 def test_a_feature_without_templates_is_refused(ridge):
     with pytest.raises(ValueError, match="templates"):
         from_document({**to_document(ridge), "templates": []})

@@ -94,9 +94,6 @@ def test_only_the_ratio_of_the_coefficients_counts(coefficients):
     np.testing.assert_allclose(one.coefficients, other.coefficients, rtol=1e-12)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the apex of a plateau is missed by 1e-8: Newton's steps leave a double root"
-)
 def test_only_the_ratio_of_a_plateaus_coefficients_counts():
     other = Section(3.125 * 30.94698586455003 * np.ones(3))
     np.testing.assert_allclose(other.coefficients, plateau().coefficients, rtol=1e-12)

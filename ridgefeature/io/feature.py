@@ -143,23 +143,32 @@ def _number(value: Any) -> Any:
     return float(value["float"]) if isinstance(value, dict) else value
 
 
+_TEMPLATE_ARRAYS = {"position": (3,), "rotation": (3, 3), "trend": (3,), "std": (8,)}
+
+
 def _template(document: dict[str, Any], section: Section) -> Template:
-    values = {f.name: document[f.name] for f in fields(Template) if f.name != "section"}
-    for name in ("position", "rotation", "trend"):
-        values[name] = _array(values[name])
-    values["std"] = None if values["std"] is None else _array(values["std"])
-    return Template(
-        section=section,
-        **{
-            k: _number(v) if k != "status" else v
-            for k, v in values.items()
-            if k not in ("position", "rotation", "trend", "std")
-        },
-        **{k: values[k] for k in ("position", "rotation", "trend", "std")},
-    )
+    values: dict[str, Any] = {"section": section}
+    for name in (f.name for f in fields(Template) if f.name != "section"):
+        value = document[name]
+        if name in _TEMPLATE_ARRAYS and not (name == "std" and value is None):
+            values[name] = _array(value)
+            if values[name].shape != _TEMPLATE_ARRAYS[name]:
+                raise ValueError(
+                    f"expected a template's {name} of shape {_TEMPLATE_ARRAYS[name]}, got {values[name].shape}; "
+                    "save the feature again"
+                )
+        elif name in ("status", "std"):
+            values[name] = value
+        else:
+            values[name] = _number(value)
+            if isinstance(values[name], bool) or not isinstance(values[name], (int, float)):
+                raise ValueError(f"expected a template's {name} to be a number, got {value!r}; save the feature again")
+    return Template(**values)
 
 
 def _check_shapes(ridge: Ridge) -> None:
+    if not ridge.templates:
+        raise ValueError("expected a feature with templates, got none; save the feature again")
     k = ridge.arc_length.shape
     for f in fields(Stations):
         want = (*k, 3) if f.name in ("spine", "tangent", "normal") else k

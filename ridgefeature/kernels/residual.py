@@ -233,15 +233,13 @@ def robust_scale(points, height, width, trend, table, floor):
 
 @njit(**_OPTIONS)
 def precondition(points, height, width, trend, table, scale, prior_weight):
-    """Whitening transform (8, 7) of the mean Huber loss of a template as it stands, from a few hundred points."""
+    """Whitening transform (8, 7) of the mean Huber loss of a template as it stands."""
     bend, rise, widening = trend[0], trend[1], trend[2]
     constant, linear, quadratic, cubic = split(table)
     normal = np.zeros((8, 8))
     row = np.empty(8)
-    step = max(points.shape[0] // 300, 1)
-    count = 0
     inverse_scale = 1.0 / scale
-    for i in range(0, points.shape[0], step):
+    for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
         root = inverse_scale * math.sqrt(weight_of(r * inverse_scale, HUBER, 1.345))
@@ -251,10 +249,9 @@ def precondition(points, height, width, trend, table, scale, prior_weight):
         for j in range(8):
             for k in range(j + 1):
                 normal[j, k] += row[j] * row[k]
-        count += 1
     for j in range(8):
         for k in range(j + 1):
-            normal[j, k] /= count
+            normal[j, k] /= points.shape[0]
             normal[k, j] = normal[j, k]
         normal[j, j] += prior_weight[j] / points.shape[0]
     return whitening(normal)
