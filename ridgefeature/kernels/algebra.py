@@ -54,15 +54,13 @@ def whitening(normal):
     bounds. normal (8, 8) of the mean loss.
     """
     lower = normal[1:, 1:].copy()
-    most = 0.0
     for i in range(7):
-        most = max(most, lower[i, i])
-    for i in range(7):
-        lower[i, i] += 1e-9 * lower[i, i] + 1e-12 * most + 1e-300
+        # Relative to each parameter's own unit, so that scaling the scan changes nothing.
+        lower[i, i] += 1e-9 * lower[i, i] + 1e-300
     transform = np.zeros((8, 7))
     if not cholesky_in_place(lower):
         for i in range(7):
-            transform[i + 1, i] = 1.0 / math.sqrt(normal[i + 1, i + 1] + 1e-9 * most + 1e-300)
+            transform[i + 1, i] = 1.0 / math.sqrt(normal[i + 1, i + 1] + 1e-300)
         return transform
     for j in range(5):
         for i in range(j, -1, -1):
