@@ -73,7 +73,7 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
     )
     starts = []
     for direction, per_length in ways:
-        position, frame = walk(last.position, normal, direction, per_length, 0.5 * last.length, 0.5 * length)
+        position, frame = walk(last.end, normal, direction, per_length, 0.5 * last.length, 0.5 * length)
         starts.append(start.changed(position=position, rotation=frame))
     return starts
 

@@ -157,16 +157,14 @@ def facing(normal, direction):
 
 
 @njit(cache=True)
-def walk(position, normal, direction, bend, first, second):
-    """Position and frame after `first` and then `second` along a path that bends by `bend` per length.
+def walk(joint, normal, direction, bend, first, second):
+    """Position and frame of a straight patch of half length `second` that begins at the joint.
 
-    Straight to the joint along the mean direction of the first stretch, then along that of the second; no stretch
-    turns by more than half a radian.
+    direction: that of the path half a patch, `first`, before the joint; the path bends by `bend` per length about
+    the normal, but by no more than a radian from patch to patch.
     """
-    half = max(-0.5, min(0.5, 0.5 * (first + second) * bend))
-    frame = facing(normal, direction)
-    joint = position + first * turned(frame[:, 0].copy(), normal, 0.5 * half)
-    frame = facing(normal, turned(frame[:, 0].copy(), normal, 2.0 * half))
+    angle = max(-1.0, min(1.0, (first + second) * bend))
+    frame = facing(normal, turned(direction, normal, angle))
     return joint + second * frame[:, 0], frame
 
 
