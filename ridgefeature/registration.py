@@ -17,7 +17,7 @@ from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
-from ridgefeature.settle import place_ends, prune, settle
+from ridgefeature.settle import finish_ends, place_ends, settle
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -92,7 +92,7 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     first = _canonical(full, first, pick, hints)
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
-    track = prune(full, settle(full, track, settings), settings)
+    track = finish_ends(full, settle(full, track, settings), settings)
     settled = settings.measure == "M" or (track.misfit is not None and not in_doubt(track.misfit, track.templates))
     if settings.section == "auto" and settled:
         return track
@@ -100,9 +100,9 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     if section is track.templates[0].section:
         return track
     templates = tuple(with_section(t, section) for t in track.templates)
-    # The ends move with the section: settled once, they are placed again.
-    track = settle(full, Track(templates, track.stop), settings)
-    return settle(full, place_ends(full, track, settings), settings)
+    # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
+    track = settle(full, settle(full, Track(templates, track.stop), settings), settings)
+    return finish_ends(full, track, settings)
 
 
 def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:

@@ -39,12 +39,12 @@ def trends(templates: list[Template]) -> list[Template]:
 
 
 def _change_point(window: Window, template: Template, reach: float, settings: Settings) -> float | None:
-    """Where along x, from the template's middle to `reach`, the ridge stops explaining more than its base does.
+    """Where along x, from the template's start to `reach`, the ridge stops explaining more than its base does.
 
     The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of x
     (the maximum-likelihood change point). None if there are too few points.
     """
-    points = window(template, 0.0, 2 * reach / template.length)
+    points = window(template, 1.0, 2 * reach / template.length)
     if len(points) < FEWEST_POINTS:
         return None
     trend, table = template.trend.copy(), template.section.table
@@ -60,7 +60,7 @@ def _change_point(window: Window, template: Template, reach: float, settings: Se
     total = np.concatenate([[0.0], np.cumsum(gain[order])])
     k = int(np.argmax(total))
     if k == 0:
-        return 0.0
+        return -0.5 * template.length
     x = points[order, 0]
     last = x[k - 1]
     return float(0.5 * (last + x[k])) if k < len(x) else float(last)
@@ -69,28 +69,30 @@ def _change_point(window: Window, template: Template, reach: float, settings: Se
 def _trim_end(window: Window, templates: list[Template], settings: Settings) -> list[Template]:
     """Templates whose last one ends where the ridge does: shortened, lengthened or dropped."""
     templates = trends(templates)
-    if len(templates) < 2:
-        only = templates[-1]
-        end = _change_point(window, only, 1.0 * only.length, settings)
-        return templates if end is None else [_relength(only, -0.5 * only.length, max(end, 0.1 * only.length))]
-    while len(templates) >= 2:
-        inner, last = templates[-2], templates[-1]
-        gap = float(np.linalg.norm(last.position - inner.position))
-        end = _change_point(window, inner, gap + 1.5 * last.length, settings)
+    while True:
+        last = templates[-1]
+        end = _change_point(window, _as_expected(templates), 1.5 * last.length, settings)
         if end is None:
             return templates
-        start = gap - 0.5 * last.length
-        rest = end - start
-        if rest < 0.45 * last.length:
-            if len(templates) == 2 or end > 0.3 * inner.length:
-                return [*templates[:-2], _relength(inner, -0.5 * inner.length, max(end, 0.3 * inner.length))]
-            templates = templates[:-1]
-            continue
-        # Where the last template stands it knows best how the ridge goes on.
-        own = _change_point(window, last, 2.0 * last.length, settings) if rest > 0.9 * last.length else None
-        high = max(rest - 0.5 * last.length, own or 0.0)
-        return [*templates[:-1], _relength(last, -0.5 * last.length, min(high, 1.2 * last.length))]
-    return templates
+        rest = end + 0.5 * last.length
+        if rest >= 0.45 * last.length or len(templates) == 1:
+            end = max(end, 0.0) if len(templates) == 1 else min(end, last.length)
+            return [*templates[:-1], _relength(last, -0.5 * last.length, end)]
+        templates = templates[:-1]
+
+
+def _as_expected(templates: list[Template]) -> Template:
+    """The last template with the height its neighbour lets expect, if that is more.
+
+    A template half beyond the end is fitted too low, and a low ridge looks as if it went on for ever.
+    """
+    last = templates[-1]
+    if len(templates) == 1:
+        return last
+    inner = templates[-2]
+    step = float(np.linalg.norm(last.position - inner.position))
+    expected = inner.height + np.clip(inner.trend[1] * step, -0.3 * abs(inner.height), 0.3 * abs(inner.height))
+    return last.changed(height=float(expected)) if abs(expected) > abs(last.height) else last
 
 
 def _relength(template: Template, low: float, high: float) -> Template:
@@ -124,12 +126,17 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     settings = settings.marching()
     bins = np.zeros((2, _BINS))
     judged = []
-    for i, template in enumerate(known):
-        new = refine(window, template, _expected(known, i, settings), settings)
-        new = judge(window, template if new.status in ("failed", "no data") else new, settings)
+    for i in range(len(known)):
+        new = _refit(window, known, i, settings)
         kernel.add_misfit(bins, window(new), new.height, new.width, new.trend, new.section.table, misfit_scale(new))
         judged.append(new)
     return Track(tuple(judged), track.stop, bins)
+
+
+def _refit(window: Window, known: list[Template], i: int, settings: Settings) -> Template:
+    """The i-th template refitted and judged; as it was where the fit failed."""
+    new = refine(window, known[i], _expected(known, i, settings), settings)
+    return judge(window, known[i] if new.status in ("failed", "no data") else new, settings)
 
 
 def misfit_scale(template: Template) -> float:
@@ -137,16 +144,19 @@ def misfit_scale(template: Template) -> float:
     return max(template.scale, 0.02 * abs(template.height), 1e-300)
 
 
-def prune(window: Window, track: Track, settings: Settings) -> Track:
-    """The track without end templates that, once refitted, are no ridge; the new ends are placed again."""
+def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
+    """The settled track without end templates that are no ridge, its ends placed again and refitted."""
     templates = list(track.templates)
     while len(templates) > 1 and not _stands(templates[-1], settings):
         templates.pop()
     while len(templates) > 1 and not _stands(templates[0], settings):
         templates.pop(0)
-    if len(templates) == len(track.templates):
-        return track
-    return settle(window, place_ends(window, Track(tuple(templates), track.stop), settings), settings)
+    placed = trends(list(place_ends(window, Track(tuple(templates), track.stop), settings).templates))
+    kept = {t.position.tobytes() for t in templates}
+    ends = [i for i in (0, len(placed) - 1) if placed[i].position.tobytes() not in kept]
+    for i in dict.fromkeys(ends):
+        placed[i] = _refit(window, placed, i, settings.marching())
+    return Track(tuple(placed), track.stop, track.misfit)
 
 
 def _stands(template: Template, settings: Settings) -> bool:
