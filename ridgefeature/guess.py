@@ -53,15 +53,18 @@ def _orient(direction: Array, normal: Array) -> Array:
     return np.column_stack([x, np.cross(normal, x), normal])
 
 
-def _start(points: Array, frame: Array, width: float, pick: Array, hints: Hints, section: Section,
-           settings: Settings) -> tuple[float, Template] | None:
+def _start(
+    points: Array, frame: Array, width: float, pick: Array, hints: Hints, section: Section, settings: Settings
+) -> tuple[float, Template] | None:
     """The best straight ridge of one width through points (n, 3) about the pick, with its score."""
     local = points @ frame
     angles = _ANGLES
     if hints.direction is not None:
         d = hints.direction @ frame
         angles = np.arctan2(d[1], d[0]) + np.radians([-10.0, 0.0, 10.0])
-    explained, angle, offset, height, a, b, c = best_straight_ridge(local, width, angles, _OFFSETS, section.table, 0)
+    explained, angle, offset, height, a, b, c = best_straight_ridge(
+        local, width, angles, _OFFSETS, section.table, 0
+    )
     if explained <= 0:
         return None
     normal = frame @ (np.array([-b, -c, 1.0]) / np.sqrt(1 + b * b + c * c))
@@ -73,14 +76,20 @@ def _start(points: Array, frame: Array, width: float, pick: Array, hints: Hints,
     if hints.height is not None:
         height = np.copysign(hints.height, height)
     template = Template(
-        position, _orient(along, normal), width, float(height),
-        settings.length * width, settings.flank * width, section,
+        position,
+        _orient(along, normal),
+        width,
+        float(height),
+        settings.length * width,
+        settings.flank * width,
+        section,
     )
     return len(points) * -np.log(max(1 - explained, 1e-6)), template
 
 
-def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
-            ) -> list[tuple[float, Template]]:
+def _starts(
+    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
+) -> list[tuple[float, Template]]:
     """Starting templates with their scores, one for each width of a geometric ladder, the best first."""
     radius, last = 3.0 * window.spacing, extent / 2.7
     if hints.width is not None:
@@ -100,8 +109,9 @@ def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: S
     return sorted(starts, key=lambda pair: -pair[0])
 
 
-def guess(window: Window, pick: Array, extent: float, hints: Hints, section: Section,
-          settings: Settings) -> Template | None:
+def guess(
+    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
+) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     Every width on a geometric ladder is tried with every direction; the best are improved until one is

@@ -53,7 +53,10 @@ def limits_of(height: float, width: float, settings: Settings) -> Limits:
     size = abs(height) + 0.1 * width
     deviation = np.array([width, 0.25 * width, 0.5 * size, *_LEAN, 2 * drift * size, drift * width])
     return Limits(
-        width / change, width * change, min(low, high), max(low, high),
+        width / change,
+        width * change,
+        min(low, high),
+        max(low, high),
         np.array([[0, 0, 0, 0, 0, 0, height, width], deviation**-2.0]),
     )
 
@@ -67,8 +70,14 @@ def _floor(template: Template) -> float:
     return SMALLEST_SCALE * max(abs(template.height), 1e-3 * template.width)
 
 
-def _minimise(points: Array, template: Template, loss: tuple[int, float], tolerance: float, limits: Limits,
-              settings: Settings) -> tuple[Template, int, str]:
+def _minimise(
+    points: Array,
+    template: Template,
+    loss: tuple[int, float],
+    tolerance: float,
+    limits: Limits,
+    settings: Settings,
+) -> tuple[Template, int, str]:
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
     table, trend, prior = template.section.table, template.trend, limits.prior
     h, w = template.height, template.width
@@ -83,8 +92,9 @@ def _minimise(points: Array, template: Template, loss: tuple[int, float], tolera
     return _run(value, template, start, transform, tolerance, limits, settings)
 
 
-def _minimise_distance(window: Window, template: Template, limits: Limits, settings: Settings
-                       ) -> tuple[Template, int, str]:
+def _minimise_distance(
+    window: Window, template: Template, limits: Limits, settings: Settings
+) -> tuple[Template, int, str]:
     """The template after one optimisation of M (Eq. 3 and 4), its mean distance to the scan; as `_minimise`."""
     h, w = template.height, template.width
     scale, transform = kernel.prepare(
@@ -111,12 +121,21 @@ def sample(template: Template, along: int = 9, across: int = 21) -> Array:
     local = np.empty((along, across, 3))
     local[..., 0] = x[:, None]
     local[..., 1] = y + 0.5 * bend * x[:, None] ** 2
-    local[..., 2] = (template.height + rise * x[:, None]) * template.section(y / (template.width + widening * x[:, None]))
+    local[..., 2] = (template.height + rise * x[:, None]) * template.section(
+        y / (template.width + widening * x[:, None])
+    )
     return template.position + local.reshape(-1, 3) @ template.rotation.T
 
 
-def _run(value: Callable[[Array, Array], float], template: Template, start: Array, transform: Array,
-         tolerance: float, limits: Limits, settings: Settings) -> tuple[Template, int, str]:
+def _run(
+    value: Callable[[Array, Array], float],
+    template: Template,
+    start: Array,
+    transform: Array,
+    tolerance: float,
+    limits: Limits,
+    settings: Settings,
+) -> tuple[Template, int, str]:
     """Minimise value(q, gradient) from q = 0 within the limits: the template moved, evaluations and status."""
     h, w = template.height, template.width
     optimiser = nlopt.opt(getattr(nlopt, settings.algorithm), 7)
@@ -153,9 +172,11 @@ def start_loss(window: Window, start: Template, scale: float) -> float:
     if len(points) < FEWEST_POINTS:
         return np.inf
     scale = max(scale, LEAST_CONTRAST * abs(start.height))
-    return float(kernel.mean_loss(
-        points, start.height, start.width, start.trend, start.section.table, scale, *_HUBER
-    )[0])
+    return float(
+        kernel.mean_loss(points, start.height, start.width, start.trend, start.section.table, scale, *_HUBER)[
+            0
+        ]
+    )
 
 
 def improve(window: Window, start: Template, settings: Settings) -> Template:
@@ -197,8 +218,15 @@ def _by_distance(window: Window, template: Template, limits: Limits, settings: S
     return template.changed(status="no data", std=None)
 
 
-def _rounds(window: Window, template: Template, limits: Limits, tolerance: float, agree: float, evaluations: int,
-            settings: Settings) -> Template:
+def _rounds(
+    window: Window,
+    template: Template,
+    limits: Limits,
+    tolerance: float,
+    agree: float,
+    evaluations: int,
+    settings: Settings,
+) -> Template:
     """Optimise with the chosen loss on the window of the result, until window and width agree."""
     for _ in range(4):
         before = template.width
@@ -215,15 +243,22 @@ def _rounds(window: Window, template: Template, limits: Limits, tolerance: float
     return _noted(points, template, evaluations, status, settings)[0]
 
 
-def _noted(points: Array, template: Template, evaluations: int, status: str, settings: Settings
-           ) -> tuple[Template, float]:
+def _noted(
+    points: Array, template: Template, evaluations: int, status: str, settings: Settings
+) -> tuple[Template, float]:
     """The template with what its fit said, and the share of points far off.
 
     Misfit of a few per cent of the height is no evidence.
     """
     scale, far, evidence = kernel.assess(
-        points, template.height, template.width, template.trend, template.section.table, _floor(template),
-        LEAST_CONTRAST * abs(template.height), *loss_of(settings),
+        points,
+        template.height,
+        template.width,
+        template.trend,
+        template.section.table,
+        _floor(template),
+        LEAST_CONTRAST * abs(template.height),
+        *loss_of(settings),
     )
     noted = template.changed(
         scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence
@@ -235,7 +270,12 @@ def judge(window: Window, template: Template, settings: Settings) -> Template:
     """The template with standard deviations and counts as its window gives them."""
     points = window(template)
     std, inliers = kernel.deviations(
-        points, template.height, template.width, template.trend, template.section.table, template.scale,
+        points,
+        template.height,
+        template.width,
+        template.trend,
+        template.section.table,
+        template.scale,
         *loss_of(settings),
     )
     return template.changed(std=std, points=len(points), inliers=int(inliers))

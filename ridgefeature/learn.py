@@ -80,10 +80,14 @@ def with_section(template: Template, section: Section) -> Template:
 def _probes(templates: tuple[Template, ...]) -> tuple[Template, ...]:
     """A few templates, spread evenly, without the ends where there are enough."""
     inner = templates[1:-1] if len(templates) > _PROBES else templates
-    return tuple(inner[i] for i in np.linspace(0, len(inner) - 1, min(_PROBES, len(inner))).round().astype(int))
+    return tuple(
+        inner[i] for i in np.linspace(0, len(inner) - 1, min(_PROBES, len(inner))).round().astype(int)
+    )
 
 
-def _refits(window: Window, probes: tuple[Template, ...], section: Section, settings: Settings) -> tuple[Template, ...]:
+def _refits(
+    window: Window, probes: tuple[Template, ...], section: Section, settings: Settings
+) -> tuple[Template, ...]:
     starts = [with_section(t, section) for t in probes]
     return tuple(refine(window, t, limits_of(t.height, t.width, settings), settings) for t in starts)
 
@@ -131,7 +135,13 @@ def _learned(eta: Array, zeta: Array, sigma: Array, settings: Settings) -> tuple
 
 def _fit(eta: Array, zeta: Array, sigma: Array, settings: Settings) -> tuple[Array, float]:
     """Raised control points (9,), falling outwards, by reweighted least squares, and their loss."""
-    columns = np.stack([uniform_basis(eta, 0), *(uniform_basis(eta, k) + uniform_basis(eta, -k) for k in range(1, REACH + 1))], 1)
+    columns = np.stack(
+        [
+            uniform_basis(eta, 0),
+            *(uniform_basis(eta, k) + uniform_basis(eta, -k) for k in range(1, REACH + 1)),
+        ],
+        1,
+    )
     half = bell()(np.arange(REACH + 1) / (2 * REACH + 4))
     for _ in range(3):
         r = (zeta - columns @ half) / sigma

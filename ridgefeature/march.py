@@ -39,7 +39,8 @@ class Track:
 
 def reverse(template: Template) -> Template:
     """The same patch, seen by someone who walks the other way."""
-    return template.changed(rotation=template.rotation * np.array([-1.0, -1.0, 1.0]),
+    return template.changed(
+        rotation=template.rotation * np.array([-1.0, -1.0, 1.0]),
         trend=-template.trend,
     )
 
@@ -65,11 +66,20 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
             before = chain[-2].position - chain[-3].position
             angle = math.atan2(normal @ cross(before, chord), before @ chord)
             per_length = 2 * angle / (step + math.sqrt(before @ before))
-            ways = [(turned(chord, normal, 0.5 * step * per_length), per_length), (own, per_length), (own, 0.0)]
+            ways = [
+                (turned(chord, normal, 0.5 * step * per_length), per_length),
+                (own, per_length),
+                (own, 0.0),
+            ]
         else:
             ways.append((chord, 0.0))
     start = last.changed(
-        length=length, flank=settings.flank * last.width, trend=np.zeros(3), std=None, evidence=0.0, status="start"
+        length=length,
+        flank=settings.flank * last.width,
+        trend=np.zeros(3),
+        std=None,
+        evidence=0.0,
+        status="start",
     )
     starts = []
     for direction, per_length in ways:
@@ -104,13 +114,18 @@ def _meets(template: Template, others: list[Template]) -> bool:
     """Whether a template lies on one of the others."""
     for other in others:
         local = other.rotation.T @ (template.position - other.position)
-        if abs(local[0]) < 0.5 * other.length and abs(local[1]) < 0.5 * other.width and abs(local[2]) < other.width:
+        if (
+            abs(local[0]) < 0.5 * other.length
+            and abs(local[1]) < 0.5 * other.width
+            and abs(local[2]) < other.width
+        ):
             return True
     return False
 
 
-def _fit_next(rough: Window, full: Window, chain: list[Template], gap: bool, settings: Settings
-              ) -> tuple[Template, Template, str]:
+def _fit_next(
+    rough: Window, full: Window, chain: list[Template], gap: bool, settings: Settings
+) -> tuple[Template, Template, str]:
     """Start and fit of the next template, and why it is none.
 
     The start that the data favour is fitted. Where that is rejected, or fits much worse than the template before,
@@ -144,8 +159,14 @@ def _unlike(starts: list[Template]) -> tuple[list[Template], list[Template]]:
     return kept, alike
 
 
-def march_one_way(rough: Window, full: Window, known: list[Template], found: list[Template], settings: Settings,
-                  progress: Progress | None = None) -> str:
+def march_one_way(
+    rough: Window,
+    full: Window,
+    known: list[Template],
+    found: list[Template],
+    settings: Settings,
+    progress: Progress | None = None,
+) -> str:
     """Append the templates that follow `known` to `found`, and tell why the march stopped.
 
     known: what is known so far, in the direction of the march; not changed.
@@ -170,7 +191,9 @@ def march_one_way(rough: Window, full: Window, known: list[Template], found: lis
     return f"max_templates ({settings.max_templates}) reached"
 
 
-def march(rough: Window, full: Window, first: Template, settings: Settings, progress: Progress | None = None) -> Track:
+def march(
+    rough: Window, full: Window, first: Template, settings: Settings, progress: Progress | None = None
+) -> Track:
     """March both ways from the first template; an interrupt ends it and keeps what is there."""
     settings = settings.marching()
     ahead: list[Template] = []

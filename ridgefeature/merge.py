@@ -58,8 +58,16 @@ def along(arc_length: Array, values: Array, at: Array, derivative: int = 0) -> A
     return np.tensordot(basis @ inverse, values, 1)
 
 
-def merged_surface(arc_length: Array, spine: Array, across: Array, normal: Array, height: Array, width: Array,
-                   border: Array, section: Section) -> Surface:
+def merged_surface(
+    arc_length: Array,
+    spine: Array,
+    across: Array,
+    normal: Array,
+    height: Array,
+    width: Array,
+    border: Array,
+    section: Section,
+) -> Surface:
     """The surface through one row of control points at each of k even stations.
 
     spine, across, normal (k, 3): origin and unit axes of each row; height, width, border (k,). The poles are affine
@@ -70,7 +78,11 @@ def merged_surface(arc_length: Array, spine: Array, across: Array, normal: Array
     knots, inverse = _interpolation(len(arc_length))
     sideways = width[:, None] * eta
     sideways[:, 0], sideways[:, -1] = -border, border
-    rows = spine[:, None] + sideways[..., None] * across[:, None] + (height[:, None] * raised)[..., None] * normal[:, None]
+    rows = (
+        spine[:, None]
+        + sideways[..., None] * across[:, None]
+        + (height[:, None] * raised)[..., None] * normal[:, None]
+    )
     poles = np.tensordot(inverse, rows, 1)
     return Surface(poles, knots * arc_length[-1], section_knots(section), DEGREE, DEGREE)
 
@@ -81,7 +93,12 @@ def template_surface(template: Template) -> Surface:
     s = np.linspace(0.0, template.length, 4)
     same = np.ones(4)
     return merged_surface(
-        s, template.start + s[:, None] * t, np.tile(template.rotation[:, 1], (4, 1)),
-        np.tile(template.rotation[:, 2], (4, 1)), template.height * same, template.width * same,
-        max(template.half_breadth, 1.01 * LEAST_BORDER * template.width) * same, template.section,
+        s,
+        template.start + s[:, None] * t,
+        np.tile(template.rotation[:, 1], (4, 1)),
+        np.tile(template.rotation[:, 2], (4, 1)),
+        template.height * same,
+        template.width * same,
+        max(template.half_breadth, 1.01 * LEAST_BORDER * template.width) * same,
+        template.section,
     )

@@ -60,7 +60,9 @@ def register(
     hints = _hints(direction, width, height, kind)
     settings = settings or Settings()
     if not isinstance(settings, Settings):
-        raise ValueError(f"settings: expected a Settings, got {type(settings).__name__}; write Settings(name=value)")
+        raise ValueError(
+            f"settings: expected a Settings, got {type(settings).__name__}; write Settings(name=value)"
+        )
     if max_templates is not None:
         settings = replace(settings, max_templates=_positive(max_templates, "max_templates", whole=True))
     if roi is not None:
@@ -75,13 +77,26 @@ def register(
     templates = _with_distances(track.templates, grid)
     stations = lay_out(templates, settings)
     return Ridge(
-        **vars(stations), section=templates[0].section, templates=templates, stop=track.stop, unit=scan.unit,
-        pick=pick, settings=settings, source=scan.source,
+        **vars(stations),
+        section=templates[0].section,
+        templates=templates,
+        stop=track.stop,
+        unit=scan.unit,
+        pick=pick,
+        settings=settings,
+        source=scan.source,
     )
 
 
-def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints, settings: Settings,
-           progress: Progress | None) -> Track:
+def _track(
+    rough: Window,
+    full: Window,
+    pick: Array,
+    extent: float,
+    hints: Hints,
+    settings: Settings,
+    progress: Progress | None,
+) -> Track:
     first = guess(rough, pick, extent, hints, first_section(settings), settings)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
@@ -93,7 +108,9 @@ def _track(rough: Window, full: Window, pick: Array, extent: float, hints: Hints
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
     track = finish_ends(full, settle(full, track, settings), settings)
-    settled = settings.measure == "M" or (track.misfit is not None and not in_doubt(track.misfit, track.templates))
+    settled = settings.measure == "M" or (
+        track.misfit is not None and not in_doubt(track.misfit, track.templates)
+    )
     if settings.section == "auto" and settled:
         return track
     section = choose_section(full, track.templates, settings)
@@ -136,7 +153,8 @@ def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Templa
     means = distances.reshape(len(templates), -1).mean(axis=1)
     floors = [sampling_floor(max(t.points, 1) / (2 * t.half_breadth * t.length)) for t in templates]
     return tuple(
-        t.changed(M=float(m), M_floor=float(floor)) for t, m, floor in zip(templates, means, floors, strict=True)
+        t.changed(M=float(m), M_floor=float(floor))
+        for t, m, floor in zip(templates, means, floors, strict=True)
     )
 
 
@@ -163,7 +181,9 @@ def _hints(direction: ArrayLike | None, width: float | None, height: float | Non
     if direction is not None:
         along = _vector(direction, "direction")
         if not np.linalg.norm(along) > 0:
-            raise ValueError("direction: expected a vector of some length, got zero; leave it out to have it found")
+            raise ValueError(
+                "direction: expected a vector of some length, got zero; leave it out to have it found"
+            )
         along = along / np.linalg.norm(along)
     return Hints(
         along,

@@ -67,7 +67,14 @@ class Ridge(Stations):
     @cached_property
     def _surface(self) -> Surface:
         return merged_surface(
-            self.arc_length, self.spine, self.across, self.normal, self.height, self.width, self.border, self.section
+            self.arc_length,
+            self.spine,
+            self.across,
+            self.normal,
+            self.height,
+            self.width,
+            self.border,
+            self.section,
         )
 
     def surface(self) -> Surface:
@@ -77,8 +84,15 @@ class Ridge(Stations):
         """
         return self._surface
 
-    def resized(self, h: float | None = None, w: float | None = None, *, height: Profile | None = None,
-                width: Profile | None = None, between: tuple[float, float] | None = None) -> Ridge:
+    def resized(
+        self,
+        h: float | None = None,
+        w: float | None = None,
+        *,
+        height: Profile | None = None,
+        width: Profile | None = None,
+        between: tuple[float, float] | None = None,
+    ) -> Ridge:
         """The ridge with other heights or widths; the border of its flanks stays.
 
         h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a function of
@@ -91,7 +105,9 @@ class Ridge(Stations):
         new_height, height_rate = self._changed("height", "h", self.height, h, height, blend)
         new_width, width_rate = self._changed("width", "w", self.width, w, width, blend)
         if not (new_width > 0).all():
-            raise ValueError(f"width: expected values above 0 everywhere, got {new_width.min():g}; use a larger w")
+            raise ValueError(
+                f"width: expected values above 0 everywhere, got {new_width.min():g}; use a larger w"
+            )
         room = self.border / LEAST_BORDER
         if (new_width > room).any():
             i = int(np.argmax(new_width / room))
@@ -100,20 +116,34 @@ class Ridge(Stations):
                 f"the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
             )
         return replace(
-            self, height=new_height, width=new_width,
-            height_std=self.height_std * np.abs(height_rate), width_std=self.width_std * width_rate,
+            self,
+            height=new_height,
+            width=new_width,
+            height_std=self.height_std * np.abs(height_rate),
+            width_std=self.width_std * width_rate,
         )
 
-    def _changed(self, name: str, rate_name: str, old: Array, rate: float | None, absolute: Profile | None,
-                 blend: Array) -> tuple[Array, Array]:
+    def _changed(
+        self,
+        name: str,
+        rate_name: str,
+        old: Array,
+        rate: float | None,
+        absolute: Profile | None,
+        blend: Array,
+    ) -> tuple[Array, Array]:
         """New values and their local rates."""
         if rate is not None and absolute is not None:
-            raise ValueError(f"expected either the rate {rate_name} or the absolute {name}, got both; drop one")
+            raise ValueError(
+                f"expected either the rate {rate_name} or the absolute {name}, got both; drop one"
+            )
         if absolute is not None:
             wanted = absolute(self.arc_length) if callable(absolute) else absolute
             values = _finite(wanted, name)
             if values.shape not in ((), old.shape):
-                raise ValueError(f"{name}: expected one number or {old.size}, one a station, got shape {values.shape}")
+                raise ValueError(
+                    f"{name}: expected one number or {old.size}, one a station, got shape {values.shape}"
+                )
             goal = np.broadcast_to(values, old.shape)
         elif rate is not None:
             goal = old * float(_finite(rate, rate_name, ()))
@@ -158,7 +188,9 @@ class Ridge(Stations):
         v = np.linspace(*surface.domain[1], n)
         at = np.array([min(float(s), self.length)])
         points = surface(at, v)
-        origin, tangent, normal = (along(self.arc_length, x, at)[0] for x in (self.spine, self.tangent, self.normal))
+        origin, tangent, normal = (
+            along(self.arc_length, x, at)[0] for x in (self.spine, self.tangent, self.normal)
+        )
         left = np.cross(normal, tangent)
         left /= np.linalg.norm(left)
         up = np.cross(tangent, left)

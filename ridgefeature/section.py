@@ -80,7 +80,9 @@ class Section:
 
 def _table(raised: Array) -> Array:
     padded = np.concatenate([np.zeros(3), raised, np.zeros(3)])
-    return np.array([[0.0] * 4, *(padded[i : i + 4] @ _UNIFORM_CUBIC for i in range(raised.size + 3)), [0.0] * 4])
+    return np.array(
+        [[0.0] * 4, *(padded[i : i + 4] @ _UNIFORM_CUBIC for i in range(raised.size + 3)), [0.0] * 4]
+    )
 
 
 def _largest(table: Array) -> float:
@@ -130,5 +132,10 @@ def uniform_basis(eta: Array, k: int) -> Array:
     return np.where(x < 1, 2 / 3 - x * x + 0.5 * x**3, np.maximum(2 - x, 0.0) ** 3 / 6)
 
 
-SECTIONS: dict[str, Callable[[], Section]] = {"bell": bell, "cosine": cosine, "plateau": plateau, "dome": dome}
+SECTIONS: dict[str, Callable[[], Section]] = {
+    "bell": bell,
+    "cosine": cosine,
+    "plateau": plateau,
+    "dome": dome,
+}
 """The sections that have a name."""

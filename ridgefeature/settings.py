@@ -41,15 +41,21 @@ class Settings:
     border: float = _setting(0.5, "breadth of the finished surface outside each foot")
     max_evaluations: int = _setting(80, "evaluations allowed for one optimisation; ten times that for M")
     tolerance: float = _setting(1e-3, "step that ends an optimisation, in units of one noise scale")
-    march_width_change: float = _setting(1.5, "largest factor by which the width may change from template to template")
-    march_height_change: float = _setting(2.0, "largest factor by which the height may rise from template to template")
+    march_width_change: float = _setting(
+        1.5, "largest factor by which the width may change from template to template"
+    )
+    march_height_change: float = _setting(
+        2.0, "largest factor by which the height may rise from template to template"
+    )
     drift: float = _setting(
         0.25, "relative change of the width between templates that is expected; of the height, twice"
     )
     width_change: float = _setting(2.0, "largest factor by which the first fit may change the width")
     height_change: float = _setting(4.0, "largest factor by which the first fit may raise the height")
     flips: bool = _setting(True, "let the first fit turn a ridge into a groove")
-    evidence: float = _setting(25.0, "log likelihood ratio, doubled, above which a first window holds a ridge")
+    evidence: float = _setting(
+        25.0, "log likelihood ratio, doubled, above which a first window holds a ridge"
+    )
     going_on: float = _setting(20.0, "the same for a window in which a known ridge is expected to go on")
     look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")
     max_templates: int = _setting(500, "templates in all")
@@ -58,7 +64,12 @@ class Settings:
         for f in fields(self):
             value, default = getattr(self, f.name), f.default
             if f.metadata["choices"]:
-                _check(value in f.metadata["choices"], f.name, f"one of {', '.join(f.metadata['choices'])}", value)
+                _check(
+                    value in f.metadata["choices"],
+                    f.name,
+                    f"one of {', '.join(f.metadata['choices'])}",
+                    value,
+                )
             elif isinstance(default, bool):
                 _check(isinstance(value, bool), f.name, "True or False", value)
             elif isinstance(default, int):
@@ -74,11 +85,22 @@ class Settings:
         import nlopt
 
         known = self.optimiser == "auto" or (
-            self.optimiser.startswith(("LD_", "LN_")) and isinstance(getattr(nlopt, self.optimiser, None), int)
+            self.optimiser.startswith(("LD_", "LN_"))
+            and isinstance(getattr(nlopt, self.optimiser, None), int)
         )
-        _check(known, "optimiser", "auto or a local NLopt algorithm such as LD_SLSQP or LN_BOBYQA", self.optimiser)
+        _check(
+            known,
+            "optimiser",
+            "auto or a local NLopt algorithm such as LD_SLSQP or LN_BOBYQA",
+            self.optimiser,
+        )
         derivative_free = self.measure == "residual" or not self.optimiser.startswith("LD_")
-        _check(derivative_free, "optimiser", "auto or an LN_ algorithm for measure M, which has no gradient", self.optimiser)
+        _check(
+            derivative_free,
+            "optimiser",
+            "auto or an LN_ algorithm for measure M, which has no gradient",
+            self.optimiser,
+        )
 
     @property
     def algorithm(self) -> str:
@@ -89,11 +111,15 @@ class Settings:
 
     def marching(self) -> Settings:
         """The settings for a template whose neighbour is known."""
-        return replace(self, width_change=self.march_width_change, height_change=self.march_height_change, flips=False)
+        return replace(
+            self, width_change=self.march_width_change, height_change=self.march_height_change, flips=False
+        )
 
 
 def _is_positive(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0
+    return (
+        isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0
+    )
 
 
 def _check(good: bool, name: str, expected: str, got: Any) -> None:

@@ -91,7 +91,9 @@ def _as_expected(templates: list[Template]) -> Template:
         return last
     inner = templates[-2]
     step = float(np.linalg.norm(last.position - inner.position))
-    expected = inner.height + np.clip(inner.trend[1] * step, -0.3 * abs(inner.height), 0.3 * abs(inner.height))
+    expected = inner.height + np.clip(
+        inner.trend[1] * step, -0.3 * abs(inner.height), 0.3 * abs(inner.height)
+    )
     return last.changed(height=float(expected)) if abs(expected) > abs(last.height) else last
 
 
@@ -101,8 +103,11 @@ def _relength(template: Template, low: float, high: float) -> Template:
     bend = template.trend[0]
     turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
     shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
-    return template.changed(position=template.position + template.rotation @ shift, rotation=template.rotation @ turn,
-        length=high - low, height=template.height + template.trend[1] * middle,
+    return template.changed(
+        position=template.position + template.rotation @ shift,
+        rotation=template.rotation @ turn,
+        length=high - low,
+        height=template.height + template.trend[1] * middle,
         width=max(template.width + template.trend[2] * middle, 0.5 * template.width),
     )
 
@@ -117,7 +122,9 @@ def place_ends(window: Window, track: Track, settings: Settings) -> Track:
 def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:
     """Limits of the i-th template about the mean of its neighbours."""
     near = [templates[k] for k in (i - 1, i + 1) if 0 <= k < len(templates)] or [templates[i]]
-    return limits_of(float(np.mean([t.height for t in near])), float(np.mean([t.width for t in near])), settings)
+    return limits_of(
+        float(np.mean([t.height for t in near])), float(np.mean([t.width for t in near])), settings
+    )
 
 
 def settle(window: Window, track: Track, settings: Settings) -> Track:
@@ -128,7 +135,9 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     judged = []
     for i in range(len(known)):
         new = _refit(window, known, i, settings)
-        kernel.add_misfit(bins, window(new), new.height, new.width, new.trend, new.section.table, misfit_scale(new))
+        kernel.add_misfit(
+            bins, window(new), new.height, new.width, new.trend, new.section.table, misfit_scale(new)
+        )
         judged.append(new)
     return Track(tuple(judged), track.stop, bins)
 
@@ -160,6 +169,8 @@ def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
 
 
 def _stands(template: Template, settings: Settings) -> bool:
-    return template.evidence >= settings.going_on and template.status != "no data" and bool(
-        template.std is not None and np.isfinite(template.std).all()
+    return (
+        template.evidence >= settings.going_on
+        and template.status != "no data"
+        and bool(template.std is not None and np.isfinite(template.std).all())
     )

@@ -49,7 +49,9 @@ def natural_spline_matrix(sites: Array, at: Array) -> Array:
     step = np.diff(sites)
     second = np.zeros((n, n))
     if n > 2:
-        system = np.diag((step[:-1] + step[1:]) / 3) + np.diag(step[1:-1] / 6, 1) + np.diag(step[1:-1] / 6, -1)
+        system = (
+            np.diag((step[:-1] + step[1:]) / 3) + np.diag(step[1:-1] / 6, 1) + np.diag(step[1:-1] / 6, -1)
+        )
         inner = np.arange(n - 2)
         right = np.zeros((n - 2, n))
         right[inner, inner] = 1 / step[:-1]
@@ -107,8 +109,13 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     splines through the templates' values in arc length, so the standard deviations follow by the same linear map.
     """
     first, last = templates[0], templates[-1]
-    sites = np.array([_on_path(first, -0.5 * first.length), *(t.position for t in templates),
-                      _on_path(last, 0.5 * last.length)])
+    sites = np.array(
+        [
+            _on_path(first, -0.5 * first.length),
+            *(t.position for t in templates),
+            _on_path(last, 0.5 * last.length),
+        ]
+    )
     chords = np.linalg.norm(np.diff(sites, axis=0), axis=1)
     parameters = np.concatenate([[0.0], np.cumsum(chords)])
     path = interpolating_curve(parameters, sites)
@@ -133,9 +140,17 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
     height_std, width_std = np.sqrt(spread**2 @ std**2).T
     curvature = np.interp(s, at, [abs(q.trend[0]) for q in templates])
-    border = np.minimum((0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width))
+    border = np.minimum(
+        (0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width)
+    )
     return Stations(
-        arc_length=s, spine=path(t), tangent=tangent, normal=normal,
-        height=height, width=width,
-        height_std=height_std, width_std=width_std, border=border,
+        arc_length=s,
+        spine=path(t),
+        tangent=tangent,
+        normal=normal,
+        height=height,
+        width=width,
+        height_std=height_std,
+        width_std=width_std,
+        border=border,
     )

@@ -14,7 +14,6 @@ from ridgefeature.template import Template
 Array = NDArray[np.float64]
 
 
-
 @dataclass(eq=False)
 class Window:
     """Points around a template, from the grid index; neighbouring requests share one look-up."""
@@ -54,7 +53,10 @@ class Window:
         cells = None
         if expected > self.most:
             ratio = half[0] / half[1]
-            cells = (max(round(np.sqrt(0.5 * self.most * ratio)), 1), max(round(np.sqrt(0.5 * self.most / ratio)), 1))
+            cells = (
+                max(round(np.sqrt(0.5 * self.most * ratio)), 1),
+                max(round(np.sqrt(0.5 * self.most / ratio)), 1),
+            )
         self._points = points_in_box(self.grid, centre, rotation.T, half, cells)
         self._held = (centre, rotation, half)
 

@@ -119,7 +119,9 @@ def _sums(points, p, rotation, trend, table, scale, loss, tuning):
         x = r00 * dx + r10 * dy + r20 * dz
         y = r01 * dx + r11 * dy + r21 * dz
         z = r02 * dx + r12 * dy + r22 * dz
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
+            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
+        )
         rho, psi = loss_jet(r * inverse_scale, loss, tuning)
         total += rho
         a, b, c = psi * r_y, psi * r_z, psi * r_x
@@ -192,7 +194,9 @@ def deviations(points, height, width, trend, table, scale, loss, tuning):
     step = 1e-4
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
+            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
+        )
         s = r / scale
         if not abs(s) < tuning:
             continue
@@ -227,7 +231,22 @@ def robust_scale(points, height, width, trend, table, floor):
     constant, linear, quadratic, cubic = split(table)
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        out[i] = abs(residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0])
+        out[i] = abs(
+            residual_jet(
+                points[i, 0],
+                points[i, 1],
+                points[i, 2],
+                height,
+                width,
+                bend,
+                rise,
+                widening,
+                constant,
+                linear,
+                quadratic,
+                cubic,
+            )[0]
+        )
     return max(1.4826 * np.median(out), floor)
 
 
@@ -241,10 +260,16 @@ def precondition(points, height, width, trend, table, scale, prior_weight):
     inverse_scale = 1.0 / scale
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)
+        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
+            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
+        )
         root = inverse_scale * math.sqrt(weight_of(r * inverse_scale, HUBER, 1.345))
         row[0], row[1], row[2] = -r_x * root, -r_y * root, -r_z * root
-        row[3], row[4], row[5] = (r_y * z - r_z * y) * root, (r_z * x - r_x * z) * root, (r_x * y - r_y * x) * root
+        row[3], row[4], row[5] = (
+            (r_y * z - r_z * y) * root,
+            (r_z * x - r_x * z) * root,
+            (r_x * y - r_y * x) * root,
+        )
         row[6], row[7] = r_h * root, r_w * root
         for j in range(8):
             for k in range(j + 1):
@@ -279,7 +304,23 @@ def mean_loss(points, height, width, trend, table, scale, loss, tuning):
     constant, linear, quadratic, cubic = split(table)
     total, far = 0.0, 0
     for i in range(points.shape[0]):
-        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0] / scale
+        r = (
+            residual_jet(
+                points[i, 0],
+                points[i, 1],
+                points[i, 2],
+                height,
+                width,
+                bend,
+                rise,
+                widening,
+                constant,
+                linear,
+                quadratic,
+                cubic,
+            )[0]
+            / scale
+        )
         total += loss_jet(r, loss, tuning)[0]
         far += abs(r) > 3.0
     return total / points.shape[0], far / points.shape[0]
@@ -292,7 +333,20 @@ def residuals(points, height, width, trend, table):
     constant, linear, quadratic, cubic = split(table)
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        out[i] = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
+        out[i] = residual_jet(
+            points[i, 0],
+            points[i, 1],
+            points[i, 2],
+            height,
+            width,
+            bend,
+            rise,
+            widening,
+            constant,
+            linear,
+            quadratic,
+            cubic,
+        )[0]
     return out
 
 
@@ -321,7 +375,20 @@ def evidence(points, height, width, trend, table, scale, loss, tuning):
     constant, linear, quadratic, cubic = split(table)
     ridge = 0.0
     for i in range(points.shape[0]):
-        r = residual_jet(points[i, 0], points[i, 1], points[i, 2], height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
+        r = residual_jet(
+            points[i, 0],
+            points[i, 1],
+            points[i, 2],
+            height,
+            width,
+            bend,
+            rise,
+            widening,
+            constant,
+            linear,
+            quadratic,
+            cubic,
+        )[0]
         ridge += loss_jet(r / scale, loss, tuning)[0]
     return 2.0 * (plane_loss(points, scale, loss, tuning, 5)[0] - ridge)
 
@@ -380,4 +447,6 @@ def explained(points, height, width, trend, table):
     ridge = residuals(points, height, width, trend, table)
     flat = points[:, 2] - plane[0] - plane[1] * points[:, 0] - plane[2] * points[:, 1]
     least = 1e-3 * most * points.shape[0]
-    return math.log((np.minimum(np.abs(flat), most).sum() + least) / (np.minimum(np.abs(ridge), most).sum() + least))
+    return math.log(
+        (np.minimum(np.abs(flat), most).sum() + least) / (np.minimum(np.abs(ridge), most).sum() + least)
+    )
