@@ -21,12 +21,12 @@ def height(s: Array) -> Array:
 
 
 def width(s: Array) -> Array:
-    return 10.0 + 1.5 * np.cos(s / 25.0)
+    return 9.0 + 1.2 * np.cos(s / 25.0)
 
 
 def main() -> None:
-    t = np.linspace(0.0, 1.0, 2001)
-    path = np.column_stack([80.0 * (t - 0.5), 22.0 * np.sin(7.0 * t) * (1 - 0.5 * t)])
+    x = np.linspace(-40.0, 40.0, 2001)
+    path = np.column_stack([x, 14.0 * np.sin(x / 14.0)])  # no bend sharper than a radius of 14 mm
     clay = Winding(path, height, width)
     scan = clay.points(n=10_000, region=100.0, noise=NOISE, seed=4)
 
@@ -36,12 +36,13 @@ def main() -> None:
     covered = float((s.max() - s.min()) / clay.arc_length[-1])
     print(f"{len(ridge.templates)} templates over {100 * covered:.1f} % of {clay.arc_length[-1]:.1f} mm")
     assert covered >= 0.95, covered
+    on = (s > 0) & (s < clay.arc_length[-1])  # beyond lie the round ends, which have no height of their own
     for name, values, std, truth in (
         ("height", ridge.height, ridge.height_std, height(s)),
         ("width", ridge.width, ridge.width_std, width(s)),
     ):
-        error = values - truth
-        within = float(np.mean(np.abs(error) <= 3 * std))
+        error = (values - truth)[on]
+        within = float(np.mean(np.abs(error) <= 3 * std[on]))
         print(f"{name}: rms error {np.sqrt(np.mean(error**2)):.3f} mm, {100 * within:.0f} % within 3 sigma")
         assert within >= 0.9, within
 
