@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import improve, sized
-from ridgefeature.kernels.residual import explained
+from ridgefeature.kernels.appraise import explained
 from ridgefeature.kernels.search import best_straight_ridge
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _LADDER = 1.4
 _FEWEST = 30
 _PAST_BEST = 3
-"""Widths in a row that explain far less than a smaller one did, after which still larger ones are not tried."""
+"""Widths in a row that explain far less than a smaller one did, after which no larger one is tried."""
 _FEWEST_TRIES = 2
 _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
@@ -29,7 +29,10 @@ _OFFSETS = np.array([-0.3, 0.0, 0.3])
 
 @dataclass(frozen=True)
 class Hints:
-    """What the user may say of the ridge at the pick; None is found by the program."""
+    """What the user may say of the ridge at the pick; what is None the program finds.
+
+    direction (3,): unit vector in the frame of the scan; kind: ridge, groove or auto.
+    """
 
     direction: Array | None = None
     width: float | None = None
@@ -63,7 +66,7 @@ def _start(
         d = hints.direction @ frame
         angles = np.arctan2(d[1], d[0]) + np.radians([-10.0, 0.0, 10.0])
     explained, angle, offset, height, a, b, c = best_straight_ridge(
-        local, width, angles, _OFFSETS, section.table, 0
+        local, width, angles, _OFFSETS, section.table
     )
     if explained <= 0:
         return None
@@ -114,8 +117,10 @@ def guess(
 ) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
-    Every width on a geometric ladder is tried with every direction; the best are improved until one is
-    clear, and the one that explains most is kept. `extent` bounds the search radius.
+    For every width on a geometric ladder the best direction and offset are found; these starts are improved,
+    the best first and at least two, until one is clear, and the one that explains most is kept. `extent`,
+    about the diameter of the scan, bounds the widths. A hinted direction (to 10 degrees) and width leave less
+    to try.
     """
     best: tuple[float, Template] | None = None
     for tried, (_, start) in enumerate(_starts(window, pick, extent, hints, section, settings)):
@@ -132,13 +137,11 @@ def guess(
 
 
 def _score(window: Window, template: Template, pick: Array) -> float:
-    """How well a template under the pick explains its window, for a fixed number of points; 0 if it is none."""
+    """How well a template explains its window, counting 300 points at most; 0 if it misses the pick."""
     if template.status in ("failed", "no data") or template.height == 0:
         return 0.0
     local = template.rotation.T @ (pick - template.position)
     if abs(local[1]) > 0.55 * template.width:
         return 0.0
     points = window(template)
-    return min(len(points), 300) * float(
-        explained(points, template.height, template.width, template.trend, template.section.table)
-    )
+    return min(len(points), 300) * float(explained(points, *template.shape))

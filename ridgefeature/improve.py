@@ -9,6 +9,7 @@ import nlopt
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.kernels import appraise
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.kernels.algebra import moved
 from ridgefeature.settings import Settings
@@ -18,13 +19,12 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 FEWEST_POINTS = 12
 _LEAN = (0.2, 0.2, 0.35)
-"""Expected turn of a fit about its own x, y, z in radians: wide enough for any bend, narrow enough to hold on to
-the ridge where the data are poor."""
-SMALLEST_SCALE = 5e-3
-"""Noise scale in parts of the height below which residuals are the model's own: no point is an outlier there."""
-
-LEAST_CONTRAST = 0.05
-"""Noise scale in parts of the height that evidence assumes at least, so that misfit of the model does not count."""
+"""Expected turn of a fit about its own x, y, z in radians: wide enough for any bend, narrow enough to hold on
+to the ridge where the data are poor."""
+_LEAST_SCALE = 5e-3
+"""Least noise scale, in parts of the height: residuals below it are the model's own, never outliers."""
+_LEAST_CONTRAST = 0.05
+"""Least noise scale of evidence, in parts of the height, so that misfit of the model does not count."""
 
 _LOSS = {"huber": kernel.HUBER, "tukey": kernel.TUKEY, "square": kernel.SQUARE, "cauchy": kernel.CAUCHY}
 _HUBER = (kernel.HUBER, 1.345)
@@ -67,7 +67,7 @@ def loss_of(settings: Settings) -> tuple[int, float]:
 
 
 def _floor(template: Template) -> float:
-    return SMALLEST_SCALE * max(abs(template.height), 1e-3 * template.width)
+    return _LEAST_SCALE * max(abs(template.height), 1e-3 * template.width)
 
 
 def _minimise(
@@ -79,15 +79,15 @@ def _minimise(
     settings: Settings,
 ) -> tuple[Template, int, str]:
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
-    table, trend, prior = template.section.table, template.trend, limits.prior
-    h, w = template.height, template.width
-    scale, transform = kernel.prepare(points, h, w, trend, table, _floor(template), prior[1])
+    h, w, trend, table = template.shape
+    prior = limits.prior
+    scale, transform = appraise.prepare(points, *template.shape, _floor(template), prior[1])
     start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, h, w])
     number, tuning = loss
     objective = kernel.objective
 
     def value(q: Array, gradient: Array) -> float:
-        return objective(q, gradient, transform, start, prior, trend, points, table, scale, number, tuning)  # type: ignore[no-any-return]
+        return objective(q, gradient, transform, start, prior, trend, points, table, scale, number, tuning)
 
     return _run(value, template, start, transform, tolerance, limits, settings)
 
@@ -95,12 +95,9 @@ def _minimise(
 def _minimise_distance(
     window: Window, template: Template, limits: Limits, settings: Settings
 ) -> tuple[Template, int, str]:
-    """The template after one optimisation of M (Eq. 3 and 4), its mean distance to the scan; as `_minimise`."""
-    h, w = template.height, template.width
-    scale, transform = kernel.prepare(
-        window(template), h, w, template.trend, template.section.table, _floor(template), limits.prior[1]
-    )
-    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, h, w])
+    """The template after one optimisation of its mean distance M to the scan (Eq. 3, 4); as `_minimise`."""
+    scale, transform = appraise.prepare(window(template), *template.shape, _floor(template), limits.prior[1])
+    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, template.height, template.width])
 
     def value(q: Array, _: Array) -> float:
         return window.mean_distance(sample(_moved(template, start, transform, q)), settings.k) / scale
@@ -136,7 +133,7 @@ def _run(
     limits: Limits,
     settings: Settings,
 ) -> tuple[Template, int, str]:
-    """Minimise value(q, gradient) from q = 0 within the limits: the template moved, evaluations and status."""
+    """Minimise value(q, gradient) from q = 0 within the limits: template moved, evaluations, status."""
     h, w = template.height, template.width
     optimiser = nlopt.opt(getattr(nlopt, settings.algorithm), 7)
     optimiser.set_min_objective(value)
@@ -171,19 +168,16 @@ def start_loss(window: Window, start: Template, scale: float) -> float:
     points = window(start)
     if len(points) < FEWEST_POINTS:
         return np.inf
-    scale = max(scale, LEAST_CONTRAST * abs(start.height))
-    return float(
-        kernel.mean_loss(points, start.height, start.width, start.trend, start.section.table, scale, *_HUBER)[
-            0
-        ]
-    )
+    scale = max(scale, _LEAST_CONTRAST * abs(start.height))
+    mean, _ = appraise.mean_loss(points, *start.shape, scale, *_HUBER)
+    return float(mean)
 
 
 def improve(window: Window, start: Template, settings: Settings) -> Template:
     """Fit one template roughly, from a start that may be far off; never raises for not converging.
 
-    Huber's loss first; where outliers are seen, or the width changed much, the chosen loss on the window of the
-    result, until window and width agree.
+    Huber's loss first; where outliers are seen, or the width changed much, the chosen loss on the window of
+    the result, until window and width agree.
     """
     points = window(start)
     if len(points) < FEWEST_POINTS:
@@ -250,15 +244,9 @@ def _noted(
 
     Misfit of a few per cent of the height is no evidence.
     """
-    scale, far, evidence = kernel.assess(
-        points,
-        template.height,
-        template.width,
-        template.trend,
-        template.section.table,
-        _floor(template),
-        LEAST_CONTRAST * abs(template.height),
-        *loss_of(settings),
+    contrast = _LEAST_CONTRAST * abs(template.height)
+    scale, far, evidence = appraise.assess(
+        points, *template.shape, _floor(template), contrast, *loss_of(settings)
     )
     noted = template.changed(
         scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence
@@ -269,13 +257,5 @@ def _noted(
 def judge(window: Window, template: Template, settings: Settings) -> Template:
     """The template with standard deviations and counts as its window gives them."""
     points = window(template)
-    std, inliers = kernel.deviations(
-        points,
-        template.height,
-        template.width,
-        template.trend,
-        template.section.table,
-        template.scale,
-        *loss_of(settings),
-    )
+    std, inliers = appraise.deviations(points, *template.shape, template.scale, *loss_of(settings))
     return template.changed(std=std, points=len(points), inliers=int(inliers))

@@ -1,4 +1,4 @@
-"""Which cross-section the points of a whole ridge agree with: one that has a name, or one learned from them."""
+"""Which cross-section the points of a whole ridge agree with: one that has a name, or a learned one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import limits_of, loss_of, refine
-from ridgefeature.kernels import residual as kernel
+from ridgefeature.kernels import appraise
 from ridgefeature.section import REACH, SECTIONS, Section, bell, uniform_basis
 from ridgefeature.settings import Settings
 from ridgefeature.settle import misfit_scale
@@ -29,7 +29,7 @@ def first_section(settings: Settings) -> Section:
 
 
 def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:
-    """Whether residuals (2, m) by distance from the spine differ from zero, by more than chance and by enough.
+    """Whether residuals (2, m) by distance from the spine differ from 0 by more than chance and by enough.
 
     More than chance: a chi-square test. Enough: one per cent of the height somewhere.
     """
@@ -43,8 +43,8 @@ def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:
 def choose_section(window: Window, templates: tuple[Template, ...], settings: Settings) -> Section:
     """The section that fits best; the templates' own unless another is better beyond doubt.
 
-    Doubt is settled by refitting a few templates with each named section, and with one learned from the residuals:
-    the likelihoods decide, with the Bayesian information criterion's price for what is learned.
+    Doubt is settled by refitting a few templates with each named section, and with one learned from the
+    residuals: the likelihoods decide, with the Bayesian information criterion's price for what is learned.
     """
     current = templates[0].section
     if settings.section in SECTIONS:
@@ -97,9 +97,7 @@ def _refitted(window: Window, probes: tuple[Template, ...], section: Section, se
     total = 0.0
     for probe, fit in zip(probes, _refits(window, probes, section, settings), strict=True):
         points = (window(probe) @ probe.rotation.T + (probe.position - fit.position)) @ fit.rotation
-        mean, _ = kernel.mean_loss(
-            points, fit.height, fit.width, fit.trend, section.table, probe.scale, *loss_of(settings)
-        )
+        mean, _ = appraise.mean_loss(points, *fit.shape, probe.scale, *loss_of(settings))
         total += len(points) * mean
     return float(total)
 
@@ -142,15 +140,16 @@ def _fit(eta: Array, zeta: Array, sigma: Array, settings: Settings) -> tuple[Arr
         ],
         1,
     )
-    half = bell()(np.arange(REACH + 1) / (2 * REACH + 4))
+    first = bell()(np.arange(REACH + 1) / (2 * REACH + 4))
+    half = first
     for _ in range(3):
         r = (zeta - columns @ half) / sigma
         weight = np.maximum(1 - (r / settings.tuning) ** 2, 0.0) / sigma
-        half = np.linalg.lstsq(columns * weight[:, None], zeta * weight, rcond=None)[0]
-        half = np.minimum.accumulate(np.maximum(half, 0.0))
-        half = half if half[0] > 0 else bell()(np.arange(REACH + 1) / (2 * REACH + 4))
+        found, *_ = np.linalg.lstsq(columns * weight[:, None], zeta * weight, rcond=None)
+        half = np.minimum.accumulate(np.maximum(np.asarray(found, dtype=np.float64), 0.0))
+        half = half if half[0] > 0 else first
     return np.concatenate([half[:0:-1], half]), _loss((zeta - columns @ half) / sigma, settings)
 
 
 def _loss(x: Array, settings: Settings) -> float:
-    return float(kernel.losses(x, *loss_of(settings)).sum())
+    return float(appraise.losses(x, *loss_of(settings)).sum())

@@ -1,4 +1,4 @@
-"""The march: APPEND template after template in both directions from the first, and say why each end stopped."""
+"""The march: APPEND template after template, both ways from the first, and say why each end stopped."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ def reverse(template: Template) -> Template:
 def append(chain: list[Template], settings: Settings) -> list[Template]:
     """Starts of the next template, one for each way the ridge may go on.
 
-    The first row lies on the last row of the last template of the chain; width and height are kept; the base is
-    that of the last three together. The ridge goes on turning as the last three centres do, or straight on, along
-    the chord of the last two centres or along the last template's own direction, whatever the data then favour: a
-    chord is known better, but lags at a kink.
+    The first row lies on the last row of the last template of the chain; width and height are kept; the base
+    is that of the last three together. The ridge goes on turning as the last three centres do, or straight
+    on, along the chord of the last two centres or along the last template's own direction, whatever the data
+    then favour: a chord is known better, but lags at a kink.
     """
     last = chain[-1]
     length = sized(last, settings).length
@@ -128,8 +128,9 @@ def _fit_next(
 ) -> tuple[Template, Template, str]:
     """Start and fit of the next template, and why it is none.
 
-    The start that the data favour is fitted. Where that is rejected, or fits much worse than the template before,
-    the other starts are tried, and last all points of the window instead of some; the best fit is kept.
+    The start that the data favour is fitted. Where that is rejected, or fits much worse than the template
+    before, the other starts are tried, and last all points of the window instead of some; the best fit is
+    kept.
     """
     starts = append(chain, settings)
     starts, alike = _unlike(starts)

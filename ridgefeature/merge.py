@@ -44,7 +44,7 @@ def _interpolation(k: int) -> tuple[Array, Array]:
     """Not-a-knot cubic knots on [0, 1] for k even sites, and the inverse of the interpolation matrix."""
     sites = np.linspace(0.0, 1.0, k)
     knots = np.concatenate([np.zeros(4), sites[2:-2], np.ones(4)])
-    inverse = np.linalg.inv(basis_matrix(knots, DEGREE, sites))
+    inverse = np.asarray(np.linalg.inv(basis_matrix(knots, DEGREE, sites)), dtype=np.float64)
     knots.setflags(write=False)
     inverse.setflags(write=False)
     return knots, inverse
@@ -70,9 +70,9 @@ def merged_surface(
 ) -> Surface:
     """The surface through one row of control points at each of k even stations.
 
-    spine, across, normal (k, 3): origin and unit axes of each row; height, width, border (k,). The poles are affine
-    in height and in width, so what does not change with them is not worked out again. u is arc length, v the
-    distance from the spine in widths (on the ridge; on the flanks it runs on to the border).
+    spine, across, normal (k, 3): origin and unit axes of each row; height, width, border (k,). The poles are
+    affine in height and in width, so what does not change with them is not worked out again. u is arc length,
+    v the distance from the spine in widths (on the ridge; on the flanks it runs on to the border).
     """
     eta, raised = section_poles(section)
     knots, inverse = _interpolation(len(arc_length))

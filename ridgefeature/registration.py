@@ -47,24 +47,18 @@ def register(
 ) -> Ridge:
     """Register the ridge under one picked point.
 
-    scan: a Scan or an (n, 3) array of unordered points. at (3,): the pick, on or near the ridge, in the scan's
-    frame. Starting guesses, all optional: direction (3,) along the ridge, in which arc length then ascends; width
-    between the feet; height of the apex. kind: "ridge", "groove" (negative height) or "auto". roi: radius about
-    the pick beyond which points are not looked at. progress: called with every template the march adds.
-    The same points in any order give the same ridge, bit for bit.
-    Raises NoRidgeError where the data agree with a flat base, ValueError for bad input. An interrupt (Ctrl-C) ends
-    the march and keeps what is there.
+    scan: a Scan or an (n, 3) array of unordered points. at (3,): the pick, on or near the ridge, in the
+    scan's frame. Starting guesses, all optional: direction (3,) along the ridge, in which arc length then
+    ascends; width between the feet; height of the apex. kind: "ridge", "groove" (negative height) or "auto".
+    roi: radius about the pick beyond which points are not looked at. progress: called with every template the
+    march adds. The same points in any order give the same ridge, bit for bit. Raises NoRidgeError where the
+    data agree with a flat base, ValueError for bad input. An interrupt (Ctrl-C) ends the march and keeps what
+    is there.
     """
     scan = as_scan(scan)
     pick = _vector(at, "at")
     hints = _hints(direction, width, height, kind)
-    settings = settings or Settings()
-    if not isinstance(settings, Settings):
-        raise ValueError(
-            f"settings: expected a Settings, got {type(settings).__name__}; write Settings(name=value)"
-        )
-    if max_templates is not None:
-        settings = replace(settings, max_templates=_positive(max_templates, "max_templates", whole=True))
+    settings = _settings(settings, max_templates)
     if roi is not None:
         scan = scan.crop(pick, _positive(roi, "roi"))
     grid = build_grid(scan.points)
@@ -72,12 +66,10 @@ def register(
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
     _check_pick(grid, pick, spacing, extent)
     rough, full = Window(grid, spacing, _ROUGH_POINTS, margin=0.2), Window(grid, spacing)
-    track = _track(rough, full, pick, extent, hints, settings, progress)
-    track = _directed(track, pick, hints)
+    track = _directed(_track(rough, full, pick, extent, hints, settings, progress), pick, hints)
     templates = _with_distances(track.templates, grid)
-    stations = lay_out(templates, settings)
     return Ridge(
-        **vars(stations),
+        **vars(lay_out(templates, settings)),
         section=templates[0].section,
         templates=templates,
         stop=track.stop,
@@ -97,12 +89,14 @@ def _track(
     settings: Settings,
     progress: Progress | None,
 ) -> Track:
+    """The whole fit: march, ends placed, templates settled; settled again where another section is better."""
     first = guess(rough, pick, extent, hints, first_section(settings), settings)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
-            f"no ridge at {_text(pick)}: the points around it agree with a flat base (evidence {found}, needed "
-            f"{settings.evidence:g}); pick a point on the ridge, or give direction=, width= and height= as a start"
+            f"no ridge at {_text(pick)}: the points around it agree with a flat base (evidence {found}, "
+            f"needed {settings.evidence:g}); pick a point on the ridge, or give direction=, width= and "
+            "height= as a start"
         )
     first = _canonical(full, first, pick, hints)
     track = march(rough, full, first, settings, progress)
@@ -125,8 +119,8 @@ def _track(
 def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:
     """The first template the way up that its kind asks for, and facing where the ridge rises.
 
-    Neither depends on how the scan is turned: a ridge and a groove differ by the side that is called up, and a
-    march both ways would else start either way.
+    Neither depends on how the scan is turned: a ridge and a groove differ by the side that is called up, and
+    a march both ways would else start either way.
     """
     if hints.kind != "auto" and (first.height < 0) != (hints.kind == "groove"):
         first = first.changed(rotation=first.rotation * np.array([1.0, -1.0, -1.0]), height=-first.height)
@@ -159,7 +153,7 @@ def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Templa
 
 
 def _spacing(grid: Grid, pick: Array) -> float:
-    """Median distance between neighbours among the points about the pick: the same however the scan is turned."""
+    """Median distance between neighbours near the pick: the same however the scan is turned."""
     near = nearest(grid, pick[None], min(_NEAR, len(grid.points)))[1][0]
     apart = nearest_distances(grid, near, 2)[:, 1]
     return float(np.median(apart[apart > 0])) if (apart > 0).any() else typical_spacing(grid)
@@ -172,6 +166,18 @@ def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:
             f"at: expected a point on or near the scan, got {_text(pick)}, {gap:.4g} from the nearest point; "
             "pick a point of the scan"
         )
+
+
+def _settings(settings: Settings | None, max_templates: int | None) -> Settings:
+    """The settings to use, checked."""
+    settings = settings or Settings()
+    if not isinstance(settings, Settings):
+        raise ValueError(
+            f"settings: expected a Settings, got {type(settings).__name__}; write Settings(name=value)"
+        )
+    if max_templates is None:
+        return settings
+    return replace(settings, max_templates=_positive(max_templates, "max_templates", whole=True))
 
 
 def _hints(direction: ArrayLike | None, width: float | None, height: float | None, kind: str) -> Hints:

@@ -26,10 +26,10 @@ Profile = float | Callable[[Array], ArrayLike]
 class Ridge(Stations):
     """A registered ridge. It holds what was found; shape is derived from it.
 
-    Lengths in the unit of the scan, coordinates in its frame, k stations evenly spaced in arc length. `height` is
-    the apex over the base; `width` the distance between the feet, where the section meets the base;
-    `half_height_width` the full width at half height. The `_std` are one standard deviation. `closed` tells
-    whether the ridge is a ring; `stop` why each end stopped, in words.
+    Lengths in the unit of the scan, coordinates in its frame, k stations evenly spaced in arc length.
+    `height` is the apex over the base; `width` the distance between the feet, where the section meets the
+    base; `half_height_width` the full width at half height. The `_std` are one standard deviation. `closed`
+    tells whether the ridge is a ring; `stop` why each end stopped, in words.
     """
 
     section: Section
@@ -95,11 +95,12 @@ class Ridge(Stations):
     ) -> Ridge:
         """The ridge with other heights or widths; the border of its flanks stays.
 
-        h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a function of
-        arc length (k,) -> (k,). between: arc lengths (s0, s1) of the stretch that changes, blended smoothly inside
-        it over a third of the stretch or one width, whichever is less. Standard deviations follow.
-        Raises ValueError for both a rate and an absolute value, values that are not finite, w or width not
-        above 0, a width too large for the flanks, or a stretch that is not on the ridge.
+        h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a
+        function of arc length (k,) -> (k,). between: arc lengths (s0, s1) of the stretch that changes,
+        blended smoothly inside it over a third of the stretch or one width, whichever is less. Standard
+        deviations follow. Raises ValueError for both a rate and an absolute value, values that are not
+        finite, w or width not above 0, a width too large for the flanks, or a stretch that is not on the
+        ridge.
         """
         blend = self._blend(between)
         new_height, height_rate = self._changed("height", "h", self.height, h, height, blend)
@@ -112,8 +113,8 @@ class Ridge(Stations):
         if (new_width > room).any():
             i = int(np.argmax(new_width / room))
             raise ValueError(
-                f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet stay on "
-                f"the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
+                f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet "
+                f"stay on the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
             )
         return replace(
             self,
@@ -158,7 +159,8 @@ class Ridge(Stations):
         low, high = (float(x) for x in _finite(between, "between", (2,)))
         if not 0 <= low < high <= self.length * (1 + 1e-12):
             raise ValueError(
-                f"between: expected 0 <= s0 < s1 <= {self.length:g}, the ridge's arc length, got ({low:g}, {high:g})"
+                f"between: expected 0 <= s0 < s1 <= {self.length:g}, the ridge's arc length, "
+                f"got ({low:g}, {high:g})"
             )
         inside = (self.arc_length > low) & (self.arc_length < high)
         if inside.sum() < 3:
@@ -175,9 +177,10 @@ class Ridge(Stations):
         return x**3 * (10 - 15 * x + 6 * x * x)
 
     def section_at(self, s: float, n: int = 101, h: float = 1.0, w: float = 1.0) -> Array:
-        """Points (n, 2) across the finished surface at arc length s: y to the left, z up, in the station's frame.
+        """Points (n, 2) across the finished surface at arc length s: y to the left and z up.
 
-        From border to border, with the rates h and w applied. Raises ValueError for s off the ridge or n < 2.
+        In the station's frame, from border to border, with the rates h and w applied. Raises ValueError for s
+        off the ridge or n < 2.
         """
         if not 0 <= float(_finite(s, "s", ())) <= self.length * (1 + 1e-12):
             raise ValueError(f"s: expected an arc length from 0 to {self.length:g}, got {s:g}")
@@ -208,7 +211,7 @@ class Ridge(Stations):
         return self.surface().project(points)[2]
 
     def save(self, path: Any) -> None:
-        """Write the feature as versioned JSON, exact to the last bit. Raises OSError if it cannot be written."""
+        """Write the feature as versioned JSON, exact to the last bit. Raises OSError where it cannot."""
         from ridgefeature.io.feature import write_feature
 
         write_feature(self, path)

@@ -1,4 +1,4 @@
-"""The cross-section of a ridge: height over the base as a function of y / width, 1 at the apex, 0 at both feet."""
+"""The cross-section of a ridge: height over the base by y / width, 1 at the apex and 0 at both feet."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _UNIFORM_CUBIC = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 
 
 
 REACH = 4
-"""Raised control points on either side of the apex's, in sections that were fitted to a shape or to points."""
+"""Raised control points on either side of the apex's, in sections fitted to a shape or to points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +24,14 @@ class Section:
     """A cubic B-spline section on uniform knots from foot to foot.
 
     coefficients: (m,) heights of the raised control points; m + 3 equal spans make the width, so value, slope
-    and curvature are zero at both feet. They are scaled so that the apex is 1.
+    and curvature are zero at both feet. They are scaled so that the apex is 1. Raises ValueError unless they
+    are finite and one is positive.
     """
 
     coefficients: Array
     name: str = "custom"
     table: Array = field(init=False, repr=False)
-    """(m + 5, 4) coefficients of 1, x, x^2, x^3 in each span, x in [0, 1); a row of zeros before and after."""
+    """(m + 5, 4) coefficients of 1, x, x^2, x^3 by span, x in [0, 1); a row of zeros before and after."""
 
     def __post_init__(self) -> None:
         raised = np.array(self.coefficients, dtype=np.float64)
@@ -73,12 +74,14 @@ class Section:
         return float(self._crossing(above[-1]) - self._crossing(above[0]))
 
     def _crossing(self, eta: float) -> float:
+        """Where the height is one half, by Newton's method from eta near by."""
         for _ in range(5):
             eta -= float((self(eta) - 0.5) / self(eta, 1))
         return eta
 
 
 def _table(raised: Array) -> Array:
+    """Coefficients (m + 5, 4) of the spans of raised control points (m,)."""
     padded = np.concatenate([np.zeros(3), raised, np.zeros(3)])
     return np.array(
         [[0.0] * 4, *(padded[i : i + 4] @ _UNIFORM_CUBIC for i in range(raised.size + 3)), [0.0] * 4]
@@ -89,7 +92,7 @@ def _largest(table: Array) -> float:
     """The largest height: at a knot, or where the slope of a span's cubic is zero."""
     best = float(table[:, 0].max())
     for a, b, c, d in table:
-        for t in np.roots(np.trim_zeros([3 * d, 2 * c, b], "f")) if (b or c or d) else ():
+        for t in np.roots(np.trim_zeros(np.array([3 * d, 2 * c, b]), "f")) if (b or c or d) else ():
             if abs(t.imag) < 1e-6 and 0 < t.real < 1:
                 best = max(best, float(a + t.real * (b + t.real * (c + t.real * d))))
     return best
@@ -103,7 +106,7 @@ def bell() -> Section:
 
 @lru_cache(maxsize=1)
 def plateau() -> Section:
-    """Three control points raised alike on six spans: the apex is at their height, half height at half width."""
+    """Three control points raised alike on six spans: its width at half height is half the width."""
     return Section(np.ones(3), "plateau")
 
 
@@ -123,7 +126,8 @@ def _fitted(shape: Callable[[Array], Array], name: str) -> Section:
     """The section of nine raised control points nearest to a symmetric shape in the mean square."""
     eta = np.linspace(-0.5, 0.5, 201)
     columns = np.stack([uniform_basis(eta, k) for k in range(-REACH, REACH + 1)], axis=1)
-    return Section(np.linalg.lstsq(columns, shape(eta), rcond=None)[0], name)
+    raised = np.asarray(np.linalg.lstsq(columns, shape(eta), rcond=None)[0], dtype=np.float64)
+    return Section(raised, name)
 
 
 def uniform_basis(eta: Array, k: int) -> Array:

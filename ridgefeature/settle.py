@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_of, refine
-from ridgefeature.kernels import residual as kernel
+from ridgefeature.kernels import appraise
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.march import Track, reverse
 from ridgefeature.settings import Settings
@@ -39,10 +38,10 @@ def trends(templates: list[Template]) -> list[Template]:
 
 
 def _change_point(window: Window, template: Template, reach: float, settings: Settings) -> float | None:
-    """Where along x, from the template's start to `reach`, the ridge stops explaining more than its base does.
+    """Where along x, from the template's start to `reach`, the ridge stops explaining more than its base.
 
-    The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of x
-    (the maximum-likelihood change point). None if there are too few points.
+    The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of
+    x (the maximum-likelihood change point). None if there are too few points.
     """
     points = window(template, 1.0, 2 * reach / template.length)
     if len(points) < FEWEST_POINTS:
@@ -51,11 +50,13 @@ def _change_point(window: Window, template: Template, reach: float, settings: Se
     # Far ahead the slopes are extrapolation: neither height nor width may more than halve.
     trend[1] = np.clip(trend[1], -0.5 * abs(template.height) / reach, 0.5 * abs(template.height) / reach)
     trend[2] = np.clip(trend[2], -0.5 * template.width / reach, 0.5 * template.width / reach)
-    ridge = kernel.residuals(points, template.height, template.width, trend, table)
-    base = kernel.residuals(points, 0.0, template.width, trend, table)
+    ridge = appraise.residuals(points, template.height, template.width, trend, table)
+    base = appraise.residuals(points, 0.0, template.width, trend, table)
     # Errors of the extrapolation must not count as noise.
     scale = max(template.scale, 0.1 * abs(template.height))
-    gain = kernel.losses(base / scale, *loss_of(settings)) - kernel.losses(ridge / scale, *loss_of(settings))
+    gain = appraise.losses(base / scale, *loss_of(settings)) - appraise.losses(
+        ridge / scale, *loss_of(settings)
+    )
     order = np.argsort(points[:, 0], kind="stable")
     total = np.concatenate([[0.0], np.cumsum(gain[order])])
     k = int(np.argmax(total))
@@ -135,9 +136,7 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     judged = []
     for i in range(len(known)):
         new = _refit(window, known, i, settings)
-        kernel.add_misfit(
-            bins, window(new), new.height, new.width, new.trend, new.section.table, misfit_scale(new)
-        )
+        appraise.add_misfit(bins, window(new), *new.shape, misfit_scale(new))
         judged.append(new)
     return Track(tuple(judged), track.stop, bins)
 
@@ -149,7 +148,7 @@ def _refit(window: Window, known: list[Template], i: int, settings: Settings) ->
 
 
 def misfit_scale(template: Template) -> float:
-    """Unit of the residuals that tell a wrong section: the noise, but no less than two per cent of the height."""
+    """Unit of the residuals that tell a wrong section: the noise, at least two per cent of the height."""
     return max(template.scale, 0.02 * abs(template.height), 1e-300)
 
 

@@ -31,9 +31,12 @@ class Stations:
     normal: Array
     """(k, 3) unit, square to the tangent."""
     height: Array
+    """(k,) apex over the base; negative for a groove."""
     width: Array
+    """(k,) between the feet."""
     height_std: Array
     width_std: Array
+    """(k,) one standard deviation, as those of the height."""
     border: Array
     """(k,) distance of the flanks' outer borders from the spine; a change of h or w does not move them."""
 
@@ -41,7 +44,8 @@ class Stations:
 def natural_spline_matrix(sites: Array, at: Array) -> Array:
     """Linear map (m, n) from values at sites (n,), ascending, to the natural cubic spline at `at` (m,).
 
-    Beyond the sites the spline goes on straight. One site: constant. (de Boor, A Practical Guide to Splines, ch. 4.)
+    Beyond the sites the spline goes on straight. One site: constant. (de Boor, A Practical Guide to Splines,
+    ch. 4.)
     """
     n = len(sites)
     if n == 1:
@@ -52,11 +56,11 @@ def natural_spline_matrix(sites: Array, at: Array) -> Array:
         system = (
             np.diag((step[:-1] + step[1:]) / 3) + np.diag(step[1:-1] / 6, 1) + np.diag(step[1:-1] / 6, -1)
         )
-        inner = np.arange(n - 2)
+        rows = np.arange(n - 2)
         right = np.zeros((n - 2, n))
-        right[inner, inner] = 1 / step[:-1]
-        right[inner, inner + 1] = -1 / step[:-1] - 1 / step[1:]
-        right[inner, inner + 2] = 1 / step[1:]
+        right[rows, rows] = 1 / step[:-1]
+        right[rows, rows + 1] = -1 / step[:-1] - 1 / step[1:]
+        right[rows, rows + 2] = 1 / step[1:]
         second[1:-1] = np.linalg.solve(system, right)
     held = np.clip(at, sites[0], sites[-1])
     i = np.clip(np.searchsorted(sites, held, side="right") - 1, 0, n - 2)
@@ -81,7 +85,8 @@ def interpolating_curve(sites: Array, points: Array) -> Curve:
     degree = min(3, n - 1)
     inner = sites[2:-2] if n > 4 else sites[:0]
     knots = np.concatenate([np.full(degree + 1, sites[0]), inner, np.full(degree + 1, sites[-1])])
-    return Curve(np.linalg.solve(basis_matrix(knots, degree, sites), points), knots, degree)
+    poles = np.asarray(np.linalg.solve(basis_matrix(knots, degree, sites), points), dtype=np.float64)
+    return Curve(poles, knots, degree)
 
 
 def _arc_lengths(path: Curve, sites: Array, per_site: int = 64) -> tuple[Array, Array]:
@@ -106,7 +111,8 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     """Stations of a chain of fitted templates.
 
     The spine is a C2 spline through the templates' centres and outer ends; height and width are natural cubic
-    splines through the templates' values in arc length, so the standard deviations follow by the same linear map.
+    splines through the templates' values in arc length, so the standard deviations follow by the same linear
+    map.
     """
     first, last = templates[0], templates[-1]
     sites = np.array(
@@ -130,6 +136,13 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     up = np.array([first.rotation[:, 2], *(q.rotation[:, 2] for q in templates), last.rotation[:, 2]])
     normal = natural_spline_matrix(ends, s) @ up
     normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    return Stations(
+        arc_length=s, spine=path(t), tangent=tangent, normal=normal, **_sizes(templates, at, s, settings)
+    )
+
+
+def _sizes(templates: tuple[Template, ...], at: Array, s: Array, settings: Settings) -> dict[str, Array]:
+    """Height, width, their deviations, and border at arc lengths s of templates whose centres are at `at`."""
     spread = natural_spline_matrix(at, s)
     std = np.array([(q.std[6], q.std[7]) if q.std is not None else (np.inf, np.inf) for q in templates])
     widths = np.array([q.width for q in templates])
@@ -143,14 +156,10 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     border = np.minimum(
         (0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width)
     )
-    return Stations(
-        arc_length=s,
-        spine=path(t),
-        tangent=tangent,
-        normal=normal,
-        height=height,
-        width=width,
-        height_std=height_std,
-        width_std=width_std,
-        border=border,
-    )
+    return {
+        "height": height,
+        "width": width,
+        "height_std": height_std,
+        "width_std": width_std,
+        "border": border,
+    }

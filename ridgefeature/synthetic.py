@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Spiral:
     heights: tuple[float, float] = (6.0, 1.0)
     widths: tuple[float, float] = (12.0, 5.0)
     region: float = 100.0
-    section: Callable[[Array], Array] = bell()
+    section: Callable[[Array], Array] = field(default_factory=bell)
     rounded: bool = False
 
     @property
@@ -79,7 +79,7 @@ class Spiral:
         points = np.column_stack([xy, self.elevation(xy)])
         if noise > 0:
             points += random.normal(0.0, noise, points.shape)
-        strays = int(round(outliers * n))
+        strays = round(outliers * n)
         if strays:
             tallest = max(self.heights)
             points[:strays, 2] = random.uniform(-tallest, 2 * tallest, strays)

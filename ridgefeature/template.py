@@ -31,9 +31,9 @@ class Template:
     flank: float
     section: Section
     trend: Array = field(default_factory=lambda: np.zeros(3))
-    """(3,) curvature of the path, slopes of height and width along it: known from the neighbours, not fitted."""
+    """(3,) curvature of the path, slopes of height and width along it: from the neighbours, not fitted."""
     std: Array | None = None
-    """(8,) one standard deviation: translation (along is fixed: 0), rotation in the own frame, height, width."""
+    """(8,) one standard deviation: translation (along: 0) and rotation in its own frame, height, width."""
     scale: float = 0.0
     """Robust standard deviation of the residuals."""
     evidence: float = 0.0
@@ -63,6 +63,11 @@ class Template:
     def end(self) -> Array:
         """(3,) middle of the last row."""
         return self.position + 0.5 * self.length * self.rotation[:, 0]
+
+    @property
+    def shape(self) -> tuple[float, float, Array, Array]:
+        """Height, width, trend and section table: what the kernels take to know the surface in its frame."""
+        return self.height, self.width, self.trend, self.section.table
 
     @property
     def half_breadth(self) -> float:

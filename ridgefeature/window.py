@@ -23,7 +23,7 @@ class Window:
     most: int = 3000
     """Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
     margin: float = 0.15
-    """How much wider than asked a look-up is, in half breadths, so that a window may turn and shift a little."""
+    """How much wider than asked a look-up is, in half breadths: windows may then turn and shift a little."""
     _held: tuple[Array, Array, Array] | None = field(default=None, init=False)
     _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
 
@@ -66,8 +66,7 @@ class Window:
         frame (3, 3): columns are two tangents and the normal; thinning is by bins along the tangents.
         """
         if np.pi * radius**2 * (0.5 / max(self.spacing, 1e-300)) ** 2 < 2 * most:
-            points = points_in_ball(self.grid, centre, radius) - centre
-            return points
+            return points_in_ball(self.grid, centre, radius) - centre
         bins = max(int(np.sqrt(most * 4 / np.pi)), 2)
         local = points_in_box(self.grid, centre, frame.T, np.full(3, radius), (bins, bins))
         local = local[(local * local).sum(axis=1) <= radius * radius]

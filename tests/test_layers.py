@@ -136,7 +136,7 @@ def test_importing_the_package_loads_neither_cad_nor_pictures():
 
 def test_files_stay_short():
     lengths = {module_of(f): len(f.read_text(encoding="utf-8").splitlines()) for f in FILES}
-    assert {m: n for m, n in lengths.items() if n > SETTLED_LATER.get(m, 320)} == {}
+    assert {m: n for m, n in lengths.items() if n > 300} == {}
 
 
 def test_functions_stay_short():
@@ -145,11 +145,6 @@ def test_functions_stay_short():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 lines = node.end_lineno - node.lineno + 1
-                if lines > FUNCTIONS_SETTLED_LATER.get(node.name, 60):
+                if lines > 60:
                     long[f"{module_of(path)}.{node.name}"] = lines
     assert long == {}
-
-
-SETTLED_LATER = {"kernels.residual": 400}
-FUNCTIONS_SETTLED_LATER = {"best_straight_ridge": 75}
-"""Longer for now."""

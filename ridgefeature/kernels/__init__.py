@@ -1,1 +1,1 @@
-"""Compiled kernels: arrays and scalars in, arrays and scalars out. Nothing here knows a class of the project."""
+"""Compiled kernels: arrays and scalars in and out. Nothing here knows a class of the project."""

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 
 @njit(cache=True)
-def cholesky_in_place(a):
+def cholesky_in_place(a: Floats) -> bool:
     """Lower Cholesky factor in the lower triangle of a (n, n); False where a is not positive definite."""
     n = a.shape[0]
     for j in range(n):
@@ -29,7 +32,7 @@ def cholesky_in_place(a):
 
 
 @njit(cache=True)
-def solve_in_place(a, b):
+def solve_in_place(a: Floats, b: Floats) -> bool:
     """Solve a x = b for symmetric positive definite a (lower triangle read, overwritten); x replaces b."""
     if not cholesky_in_place(a):
         return False
@@ -46,12 +49,12 @@ def solve_in_place(a, b):
 
 
 @njit(cache=True)
-def whitening(normal):
+def whitening(normal: Floats) -> Floats:
     """(8, 7) transform whose Hessian is near unity, height and width each an axis of their own.
 
-    The first parameter (sliding) stays fixed. The other five placements are whitened by the Cholesky factor of
-    their block and follow height and width along the valley floor, so that bounds on height and width stay simple
-    bounds. normal (8, 8) of the mean loss.
+    The first parameter (sliding) stays fixed. The other five placements are whitened by the Cholesky factor
+    of their block and follow height and width along the valley floor, so that bounds on height and width stay
+    simple bounds. normal (8, 8) of the mean loss.
     """
     lower = normal[1:, 1:].copy()
     for i in range(7):
@@ -83,8 +86,10 @@ def whitening(normal):
 
 
 @njit(cache=True)
-def moved(position, rotation, start, transform, q):
-    """Position (3,), rotation (3, 3), height and width at start + transform @ q, increments in the given frame."""
+def moved(
+    position: Floats, rotation: Floats, start: Floats, transform: Floats, q: Floats
+) -> tuple[Floats, Floats, float, float]:
+    """Position (3,), rotation (3, 3), height and width at start + transform @ q, in the given frame."""
     p = start.copy()
     for i in range(8):
         for j in range(q.size):
@@ -112,7 +117,7 @@ def moved(position, rotation, start, transform, q):
 
 
 @njit(cache=True)
-def rotation_of(vector):
+def rotation_of(vector: Floats) -> tuple[Floats, Floats]:
     """Rotation matrix (columns: new axes in the old frame) and right Jacobian of a rotation vector."""
     x, y, z = vector[0], vector[1], vector[2]
     square = x * x + y * y + z * z
@@ -137,7 +142,7 @@ def rotation_of(vector):
 
 
 @njit(cache=True)
-def turned(direction, normal, angle):
+def turned(direction: Floats, normal: Floats, angle: float) -> Floats:
     """A direction (3,) turned about the unit normal (Rodrigues)."""
     cosine, sine = math.cos(angle), math.sin(angle)
     along = (1.0 - cosine) * (normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2])
@@ -145,7 +150,7 @@ def turned(direction, normal, angle):
 
 
 @njit(cache=True)
-def facing(normal, direction):
+def facing(normal: Floats, direction: Floats) -> Floats:
     """The frame (columns) with this unit normal that faces along the direction, as far as the base allows."""
     x = direction - normal * (normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2])
     x /= math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
@@ -157,11 +162,13 @@ def facing(normal, direction):
 
 
 @njit(cache=True)
-def walk(joint, normal, direction, bend, first, second):
+def walk(
+    joint: Floats, normal: Floats, direction: Floats, bend: float, first: float, second: float
+) -> tuple[Floats, Floats]:
     """Position and frame of a straight patch of half length `second` that begins at the joint.
 
-    direction: that of the path half a patch, `first`, before the joint; the path bends by `bend` per length about
-    the normal, but by no more than a radian from patch to patch.
+    direction: that of the path half a patch, `first`, before the joint; the path bends by `bend` per length
+    about the normal, but by no more than a radian from patch to patch.
     """
     angle = max(-1.0, min(1.0, (first + second) * bend))
     frame = facing(normal, turned(direction, normal, angle))
@@ -169,7 +176,7 @@ def walk(joint, normal, direction, bend, first, second):
 
 
 @njit(cache=True)
-def cross(a, b):
+def cross(a: Floats, b: Floats) -> Floats:
     """Vector product of a (3,) and b (3,)."""
     out = np.empty(3)
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -179,11 +186,23 @@ def cross(a, b):
 
 
 @njit(cache=True)
-def select(points, old_position, old_rotation, reach, position, rotation, low, high, half_y, half_z):
+def select(
+    points: Floats,
+    old_position: Floats,
+    old_rotation: Floats,
+    reach: Floats,
+    position: Floats,
+    rotation: Floats,
+    low: float,
+    high: float,
+    half_y: float,
+    half_z: float,
+) -> tuple[Floats, bool]:
     """Points of the frame `old` brought to a new frame, those in the new box kept; and whether old covers it.
 
-    points (n, 3) hold everything within `reach` (3,) of the old frame's origin, in that frame. The new box runs
-    from low to high in x and lies within half_y and half_z in y and z. Frames: origin (3,), axes as columns.
+    points (n, 3) hold everything within `reach` (3,) of the old frame's origin, in that frame. The new box
+    runs from low to high in x and lies within half_y and half_z in y and z. Frames: origin (3,), axes as
+    columns.
     """
     turn = np.zeros((3, 3))
     shift = np.zeros(3)

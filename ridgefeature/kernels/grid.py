@@ -14,18 +14,25 @@ queries stay exact.
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Cells = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
 
 LIMIT = 1e150  # the squares of larger coordinates would overflow
 BLOCK = 512
 
 
 @njit(cache=True)
-def cell_index(value, low, inverse, count):
+def cell_index(value: float, low: float, inverse: float, count: int) -> np.int64:
+    """Cell of a coordinate along an axis of `count` cells, the first of which begins at `low`."""
     return np.int64(min(max((value - low) * inverse, 0.0), count - 1.0))
 
 
 @njit(cache=True)
-def bounds(points):
+def bounds(points: Floats) -> tuple[Floats, int]:
     """Smallest and largest coordinates (6,); the first row that is not finite or beyond LIMIT, else -1."""
     out = np.array([np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf])
     bad = False
@@ -44,7 +51,7 @@ def bounds(points):
 
 
 @njit(cache=True)
-def _block_cells(points, first, m, levels, frame, cells):
+def _block_cells(points: Floats, first: int, m: int, levels: Ints, frame: Floats, cells: Cells) -> None:
     """Cell numbers of m points from `first` on; in blocks, as the random accesses after it then overlap."""
     x0, y0, z0, ix, iy, iz = frame[0], frame[1], frame[2], frame[6], frame[7], frame[8]
     nx, ny, nz = levels[0, 0], levels[0, 1], levels[0, 2]
@@ -56,7 +63,7 @@ def _block_cells(points, first, m, levels, frame, cells):
 
 
 @njit(cache=True)
-def count_cells(points, levels, frame, counts):
+def count_cells(points: Floats, levels: Ints, frame: Floats, counts: Cells) -> None:
     """Add the number of points of every cell to counts."""
     n = points.shape[0]
     cells = np.empty(BLOCK, np.int32)
@@ -68,7 +75,7 @@ def count_cells(points, levels, frame, counts):
 
 
 @njit(cache=True)
-def sort_into_cells(points, levels, frame, starts, out):
+def sort_into_cells(points: Floats, levels: Ints, frame: Floats, starts: Cells, out: Floats) -> None:
     """Counting sort. `starts` comes with counts, 0 at its end, and leaves with the first row of each cell."""
     total = 0
     for c in range(starts.shape[0]):
@@ -91,7 +98,7 @@ def sort_into_cells(points, levels, frame, starts, out):
 
 
 @njit(cache=True)
-def fill_tree(starts, levels, tree):
+def fill_tree(starts: Cells, levels: Ints, tree: Bytes) -> None:
     """Mark the occupied nodes of every level above the cells."""
     for level in range(1, levels.shape[0]):
         nx, ny, nz, below = (
@@ -115,7 +122,7 @@ def fill_tree(starts, levels, tree):
 
 
 @njit(cache=True)
-def before(a, i, b, j):
+def before(a: Floats, i: int, b: Floats, j: int) -> bool:
     """Whether row i of a comes before row j of b in the order of x, then y, then z."""
     for axis in range(3):
         if a[i, axis] != b[j, axis]:
@@ -124,7 +131,7 @@ def before(a, i, b, j):
 
 
 @njit(cache=True)
-def probe_cells(points, starts, levels, frame, cells):
+def probe_cells(points: Floats, starts: Cells, levels: Ints, frame: Floats, cells: Ints) -> Floats:
     """One point (m, 3) of every given cell, chosen by its coordinates as if at random, never by its row."""
     out = np.empty((cells.shape[0], 3))
     for i in range(cells.shape[0]):

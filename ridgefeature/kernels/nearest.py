@@ -3,13 +3,16 @@
 import numpy as np
 from numba import njit
 
-from .grid import LIMIT, before, cell_index
+from .grid import LIMIT, Bytes, Cells, Floats, Ints, before, cell_index
+
+Point = tuple[float, float, float]
+Block = tuple[int, int, int, int, int, int]
 
 FEW_CELLS = 64  # up to so many cells are looked through one by one; beyond, the tree is descended
 
 
 @njit(cache=True, inline="always")  # a third of the time of a query otherwise
-def _visit(points, first, last, query, best, rows, i):
+def _visit(points: Floats, first: int, last: int, query: Point, best: Floats, rows: Ints, i: int) -> None:
     """Put points[first:last] among the k best of query i. Equal distances go by coordinates, never by row."""
     x, y, z = query
     k = best.shape[1]
@@ -32,7 +35,17 @@ def _visit(points, first, last, query, best, rows, i):
 
 
 @njit(cache=True)
-def _visit_block(points, starts, levels, block, done, query, best, rows, i):
+def _visit_block(
+    points: Floats,
+    starts: Cells,
+    levels: Ints,
+    block: Block,
+    done: Block,
+    query: Point,
+    best: Floats,
+    rows: Ints,
+    i: int,
+) -> None:
     """Visit the cells of a block (x0, x1, y0, y1, z0, z1; both ends in) except those of the block `done`."""
     x0, x1, y0, y1, z0, z1 = block
     a0, a1, b0, b1, c0, c1 = done
@@ -49,7 +62,7 @@ def _visit_block(points, starts, levels, block, done, query, best, rows, i):
 
 
 @njit(cache=True)
-def _gap(levels, frame, axis, level, index, value):
+def _gap(levels: Ints, frame: Floats, axis: int, level: int, index: int, value: float) -> float:
     """A lower bound of the distance along an axis to the points of a node."""
     first = index << level
     last = (index + 1) << level
@@ -62,7 +75,20 @@ def _gap(levels, frame, axis, level, index, value):
 
 
 @njit(cache=True)
-def _descend(points, starts, tree, levels, frame, done, query, best, rows, i, stack, gaps):
+def _descend(
+    points: Floats,
+    starts: Cells,
+    tree: Bytes,
+    levels: Ints,
+    frame: Floats,
+    done: Block,
+    query: Point,
+    best: Floats,
+    rows: Ints,
+    i: int,
+    stack: Ints,
+    gaps: Floats,
+) -> None:
     """Depth first, near nodes first, through nodes nearer than the k-th best; skips the cells of `done`."""
     k = best.shape[1]
     x, y, z = query
@@ -104,7 +130,7 @@ def _descend(points, starts, tree, levels, frame, done, query, best, rows, i, st
 
 
 @njit(cache=True)
-def _reach(levels, frame, axis, value, radius):
+def _reach(levels: Ints, frame: Floats, axis: int, value: float, radius: float) -> tuple[int, int]:
     """First and last cell along an axis that hold the points within a radius of a coordinate."""
     r = radius * (1.0 + 1e-14) + 1e-15 * abs(value)
     first = cell_index(value - r, frame[axis], frame[6 + axis], levels[0, axis])
@@ -112,7 +138,16 @@ def _reach(levels, frame, axis, value, radius):
 
 
 @njit(cache=True)
-def search(points, starts, tree, levels, frame, queries, best, rows):
+def search(
+    points: Floats,
+    starts: Cells,
+    tree: Bytes,
+    levels: Ints,
+    frame: Floats,
+    queries: Floats,
+    best: Floats,
+    rows: Ints,
+) -> bool:
     """Distances (m, k), ascending, and rows (m, k) of the k nearest points, into best and rows.
 
     False, and nothing to rely on, if a query is not finite.

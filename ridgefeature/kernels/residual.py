@@ -7,11 +7,10 @@ first-order distance to the surface (Sampson 1982). Parameters are ordered
     o_x o_y o_z   rotation vector about the start frame's origin
     height, width
 
-`table` holds the section as cubics, one row a span: coefficients of 1, x, x^2, x^3 with x in [0, 1); the first and
-the last row are zeros and stand for what lies outside the feet.
-`trend` (3,) holds what the neighbours tell and the fit takes as given: the curvature of the path (y is measured
-from the osculating circle, to second order), and the slopes of height and width along x. A template alone has
-zeros.
+`table` holds the section as cubics, one row a span: coefficients of 1, x, x^2, x^3 with x in [0, 1); the
+first and the last row are zeros and stand for what lies outside the feet. `trend` (3,) holds what the
+neighbours tell and the fit takes as given: the curvature of the path (y is measured from the osculating
+circle, to second order), and the slopes of height and width along x. A template alone has zeros.
 """
 
 from __future__ import annotations
@@ -21,18 +20,33 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import rotation_of, solve_in_place, whitening
+from ridgefeature.kernels.algebra import rotation_of
 
+Floats = NDArray[np.float64]
 HUBER, TUKEY, SQUARE, CAUCHY = 0, 1, 2, 3
 
-# Sums may be reordered and divisions go unchecked: the loops over points then run in SIMD, three times faster.
-_INNER: dict[str, Any] = {"fastmath": True, "error_model": "numpy"}
-_OPTIONS: dict[str, Any] = {"cache": True, **_INNER}
+# Sums may be reordered and divisions go unchecked: loops over points then run in SIMD, three times faster.
+INNER: dict[str, Any] = {"fastmath": True, "error_model": "numpy"}
+OPTIONS: dict[str, Any] = {"cache": True, **INNER}
 
 
-@njit(**_INNER)
-def residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic):
+@njit(**INNER)
+def residual_jet(
+    x: float,
+    y: float,
+    z: float,
+    height: float,
+    width: float,
+    bend: float,
+    rise: float,
+    widening: float,
+    constant: Floats,
+    linear: Floats,
+    quadratic: Floats,
+    cubic: Floats,
+) -> tuple[float, float, float, float, float, float]:
     """Residual and its derivatives with respect to x, y, z, height and width. Free of branches, for SIMD.
 
     The trend as its three numbers, the table as its four columns: tuples would hinder SIMD.
@@ -63,20 +77,20 @@ def residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear,
     return r, r_x, r_y, inverse, r_h, r_w
 
 
-@njit(**_INNER)
-def columns(array):
-    """The columns of an array (n, 3), each contiguous: loops over them run in SIMD, which is worth the copy."""
+@njit(**INNER)
+def columns(array: Floats) -> tuple[Floats, Floats, Floats]:
+    """The columns of an array (n, 3), each contiguous: loops over them run in SIMD, worth the copy."""
     return array[:, 0].copy(), array[:, 1].copy(), array[:, 2].copy()
 
 
-@njit(**_INNER)
-def split(table):
+@njit(**INNER)
+def split(table: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """The four columns of a section's table, each contiguous."""
     return table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy(), table[:, 3].copy()
 
 
-@njit(**_INNER)
-def loss_jet(x, loss, tuning):
+@njit(**INNER)
+def loss_jet(x: float, loss: int, tuning: float) -> tuple[float, float]:
     """Loss rho(x) and its derivative psi(x), for a residual in units of its scale."""
     if loss == TUKEY:
         q = max(1.0 - (x / tuning) * (x / tuning), 0.0)
@@ -90,8 +104,8 @@ def loss_jet(x, loss, tuning):
     return 0.5 * x * x, x
 
 
-@njit(**_INNER)
-def weight_of(x, loss, tuning):
+@njit(**INNER)
+def weight_of(x: float, loss: int, tuning: float) -> float:
     """Weight psi(x) / x of a residual in units of its scale."""
     if loss == TUKEY:
         return max(1.0 - (x / tuning) * (x / tuning), 0.0) ** 2
@@ -102,9 +116,18 @@ def weight_of(x, loss, tuning):
     return 1.0
 
 
-@njit(**_INNER)
-def _sums(points, p, rotation, trend, table, scale, loss, tuning):
-    """Sum of the loss, and of psi times the residual's gradient: by x, y, z, rotation about x, y, z, height, width."""
+@njit(**INNER)
+def _sums(
+    points: Floats,
+    p: Floats,
+    rotation: Floats,
+    trend: Floats,
+    table: Floats,
+    scale: float,
+    loss: int,
+    tuning: float,
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Sums of the loss and of psi times the residual's gradient: by x, y, z, turns, height and width."""
     inverse_scale = 1.0 / scale
     p0, p1, p2, height, width = p[0], p[1], p[2], p[6], p[7]
     r00, r10, r20 = rotation[0, 0], rotation[1, 0], rotation[2, 0]
@@ -137,12 +160,24 @@ def _sums(points, p, rotation, trend, table, scale, loss, tuning):
     return total, g_x, g_y, g_z, c_x, c_y, c_z, g_h, g_w
 
 
-@njit(**_OPTIONS)
-def objective(q, gradient, transform, start, prior, trend, points, table, scale, loss, tuning):
+@njit(**OPTIONS)
+def objective(
+    q: Floats,
+    gradient: Floats,
+    transform: Floats,
+    start: Floats,
+    prior: Floats,
+    trend: Floats,
+    points: Floats,
+    table: Floats,
+    scale: float,
+    loss: int,
+    tuning: float,
+) -> float:
     """Mean robust loss at parameters start + transform @ q; its gradient in q is written to `gradient`.
 
-    points (n, 3) in the start frame; start (8,); transform (8, m); q (m,). prior (2, 8): expected parameters and
-    their reciprocal variances; it counts once, whatever the number of points.
+    points (n, 3) in the start frame; start (8,); transform (8, m); q (m,). prior (2, 8): expected parameters
+    and their reciprocal variances; it counts once, whatever the number of points.
     """
     p = start.copy()
     for i in range(8):
@@ -176,277 +211,3 @@ def objective(q, gradient, transform, start, prior, trend, points, table, scale,
     for i in range(8):
         total += 0.5 * prior[1, i] * (p[i] - prior[0, i]) ** 2
     return total / points.shape[0]
-
-
-@njit(**_OPTIONS)
-def deviations(points, height, width, trend, table, scale, loss, tuning):
-    """Standard deviations (8,) of a fitted template's parameters, and its number of inliers.
-
-    The asymptotic variance of an M-estimator (Huber 1981, 7.6) with its small-sample factor, from the points within
-    `tuning` scales. points (n, 3) in the template's frame. Infinite where the points do not tell.
-    """
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    normal = np.zeros((8, 8))
-    row = np.empty(8)
-    inliers = 0
-    psi_square = psi_slope = 0.0
-    step = 1e-4
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
-            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
-        )
-        s = r / scale
-        if not abs(s) < tuning:
-            continue
-        inliers += 1
-        psi_square += loss_jet(s, loss, tuning)[1] ** 2
-        psi_slope += (loss_jet(s + step, loss, tuning)[1] - loss_jet(s - step, loss, tuning)[1]) / (2 * step)
-        row[0], row[1], row[2] = -r_x, -r_y, -r_z
-        row[3], row[4], row[5] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
-        row[6], row[7] = r_h, r_w
-        for j in range(8):
-            for k in range(j + 1):
-                normal[j, k] += row[j] * row[k]
-    std = np.full(8, np.inf)
-    std[0] = 0.0
-    if inliers <= 8 or not psi_slope > 0.0:
-        return std, inliers
-    factor = scale * scale * psi_square * inliers * inliers / (psi_slope * psi_slope * (inliers - 7))
-    free = normal[1:, 1:]
-    column = np.empty(7)
-    for i in range(7):
-        column[:] = 0.0
-        column[i] = 1.0
-        if solve_in_place(free.copy(), column):
-            std[i + 1] = math.sqrt(factor * column[i])
-    return std, inliers
-
-
-@njit(**_OPTIONS)
-def robust_scale(points, height, width, trend, table, floor):
-    """Standard deviation of the residuals from the median of their absolute values, not below floor."""
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    out = np.empty(points.shape[0])
-    for i in range(points.shape[0]):
-        out[i] = abs(
-            residual_jet(
-                points[i, 0],
-                points[i, 1],
-                points[i, 2],
-                height,
-                width,
-                bend,
-                rise,
-                widening,
-                constant,
-                linear,
-                quadratic,
-                cubic,
-            )[0]
-        )
-    return max(1.4826 * np.median(out), floor)
-
-
-@njit(**_OPTIONS)
-def precondition(points, height, width, trend, table, scale, prior_weight):
-    """Whitening transform (8, 7) of the mean Huber loss of a template as it stands."""
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    normal = np.zeros((8, 8))
-    row = np.empty(8)
-    inverse_scale = 1.0 / scale
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
-            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
-        )
-        root = inverse_scale * math.sqrt(weight_of(r * inverse_scale, HUBER, 1.345))
-        row[0], row[1], row[2] = -r_x * root, -r_y * root, -r_z * root
-        row[3], row[4], row[5] = (
-            (r_y * z - r_z * y) * root,
-            (r_z * x - r_x * z) * root,
-            (r_x * y - r_y * x) * root,
-        )
-        row[6], row[7] = r_h * root, r_w * root
-        for j in range(8):
-            for k in range(j + 1):
-                normal[j, k] += row[j] * row[k]
-    for j in range(8):
-        for k in range(j + 1):
-            normal[j, k] /= points.shape[0]
-            normal[k, j] = normal[j, k]
-        normal[j, j] += prior_weight[j] / points.shape[0]
-    return whitening(normal)
-
-
-@njit(**_OPTIONS)
-def prepare(points, height, width, trend, table, floor, prior_weight):
-    """Robust scale and whitening transform of a template as it stands."""
-    scale = robust_scale(points, height, width, trend, table, floor)
-    return scale, precondition(points, height, width, trend, table, scale, prior_weight)
-
-
-@njit(**_OPTIONS)
-def assess(points, height, width, trend, table, floor, contrast, loss, tuning):
-    """Robust scale, share of points beyond three scales, and evidence at no less than the scale `contrast`."""
-    scale = robust_scale(points, height, width, trend, table, floor)
-    far = mean_loss(points, height, width, trend, table, scale, HUBER, tuning)[1]
-    return scale, far, evidence(points, height, width, trend, table, max(scale, contrast), loss, tuning)
-
-
-@njit(**_OPTIONS)
-def mean_loss(points, height, width, trend, table, scale, loss, tuning):
-    """Mean robust loss of a template as it stands, and the share of points beyond three scales."""
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    total, far = 0.0, 0
-    for i in range(points.shape[0]):
-        r = (
-            residual_jet(
-                points[i, 0],
-                points[i, 1],
-                points[i, 2],
-                height,
-                width,
-                bend,
-                rise,
-                widening,
-                constant,
-                linear,
-                quadratic,
-                cubic,
-            )[0]
-            / scale
-        )
-        total += loss_jet(r, loss, tuning)[0]
-        far += abs(r) > 3.0
-    return total / points.shape[0], far / points.shape[0]
-
-
-@njit(**_OPTIONS)
-def residuals(points, height, width, trend, table):
-    """Residuals (n,) of points (n, 3) in the template's frame."""
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    out = np.empty(points.shape[0])
-    for i in range(points.shape[0]):
-        out[i] = residual_jet(
-            points[i, 0],
-            points[i, 1],
-            points[i, 2],
-            height,
-            width,
-            bend,
-            rise,
-            widening,
-            constant,
-            linear,
-            quadratic,
-            cubic,
-        )[0]
-    return out
-
-
-@njit(**_OPTIONS)
-def add_misfit(bins, points, height, width, trend, table, scale):
-    """Add to bins (2, m) the number and the sum of clipped residuals, in scales, by distance from the spine.
-
-    The m bins share the distances up to the width. points (n, 3) in the template's frame.
-    """
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    per_bin = bins.shape[1] / width
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r = residual_jet(x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic)[0]
-        k = int(abs(y) * per_bin)
-        if k < bins.shape[1]:
-            bins[0, k] += 1.0
-            bins[1, k] += min(max(r / scale, -2.0), 2.0)
-
-
-@njit(**_OPTIONS)
-def evidence(points, height, width, trend, table, scale, loss, tuning):
-    """Twice the loss that a plane has more than the template; points (n, 3) in the template's frame."""
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    ridge = 0.0
-    for i in range(points.shape[0]):
-        r = residual_jet(
-            points[i, 0],
-            points[i, 1],
-            points[i, 2],
-            height,
-            width,
-            bend,
-            rise,
-            widening,
-            constant,
-            linear,
-            quadratic,
-            cubic,
-        )[0]
-        ridge += loss_jet(r / scale, loss, tuning)[0]
-    return 2.0 * (plane_loss(points, scale, loss, tuning, 5)[0] - ridge)
-
-
-@njit(**_OPTIONS)
-def losses(x, loss, tuning):
-    """Loss (n,) of residuals x (n,) in units of their scale."""
-    out = np.empty(x.size)
-    for i in range(x.size):
-        out[i] = loss_jet(x[i], loss, tuning)[0]
-    return out
-
-
-@njit(**_OPTIONS)
-def plane_loss(points, scale, loss, tuning, iterations):
-    """Smallest robust loss of a plane z = a + b x + c y found by reweighting, and the plane; points (n, 3)."""
-    normal = np.zeros((3, 3))
-    right = np.zeros(3)
-    plane = np.zeros(3)
-    best, best_plane = np.inf, plane.copy()
-    for _ in range(iterations):
-        normal[:] = 0.0
-        right[:] = 0.0
-        total = 0.0
-        for i in range(points.shape[0]):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            r = z - plane[0] - plane[1] * x - plane[2] * y
-            weight = weight_of(r / scale, loss, tuning)
-            total += loss_jet(r / scale, loss, tuning)[0]
-            normal[0, 0] += weight
-            normal[1, 0] += weight * x
-            normal[2, 0] += weight * y
-            normal[1, 1] += weight * x * x
-            normal[2, 1] += weight * x * y
-            normal[2, 2] += weight * y * y
-            right[0] += weight * r
-            right[1] += weight * r * x
-            right[2] += weight * r * y
-        if total < best:
-            best, best_plane = total, plane.copy()
-        if not solve_in_place(normal, right):
-            break
-        plane += right
-    return best, best_plane
-
-
-@njit(**_OPTIONS)
-def explained(points, height, width, trend, table):
-    """Log of the mean absolute residual of the best plane over that of the template, both clipped at the height.
-
-    points (n, 3) in the template's frame. Unlike evidence it grows as the noise found shrinks, so it tells good
-    fits of different windows apart.
-    """
-    most = abs(height)
-    plane = plane_loss(points, 0.3 * most, HUBER, 1.345, 5)[1]
-    ridge = residuals(points, height, width, trend, table)
-    flat = points[:, 2] - plane[0] - plane[1] * points[:, 0] - plane[2] * points[:, 1]
-    least = 1e-3 * most * points.shape[0]
-    return math.log(
-        (np.minimum(np.abs(flat), most).sum() + least) / (np.minimum(np.abs(ridge), most).sum() + least)
-    )

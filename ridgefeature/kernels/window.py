@@ -3,11 +3,11 @@
 import numpy as np
 from numba import njit
 
-from .grid import LIMIT, before, cell_index
+from .grid import LIMIT, Cells, Floats, Ints, before, cell_index
 
 
 @njit(cache=True)
-def _sort_rows(rows, first, last):
+def _sort_rows(rows: Floats, first: int, last: int) -> None:
     """Sort rows[first:last] by x, then y, then z, in place (Shell sort: short runs, no worst case of n^2)."""
     gap = 1
     while gap < (last - first) // 3:
@@ -27,14 +27,14 @@ def _sort_rows(rows, first, last):
 
 
 @njit(cache=True)
-def _span(levels, frame, axis, low, high):
+def _span(levels: Ints, frame: Floats, axis: int, low: float, high: float) -> tuple[int, int]:
     """First and last cell along an axis for coordinates from low to high."""
     first = cell_index(low, frame[axis], frame[6 + axis], levels[0, axis])
     return first, cell_index(high, frame[axis], frame[6 + axis], levels[0, axis])
 
 
 @njit(cache=True)
-def _slab(levels, frame, axis, index):
+def _slab(levels: Ints, frame: Floats, axis: int, index: int) -> tuple[float, float]:
     """Smallest and largest coordinate of the points in the cells with this index along an axis."""
     low = frame[axis] + index * frame[3 + axis] - frame[15 + axis]
     high = frame[axis] + (index + 1) * frame[3 + axis] + frame[15 + axis]
@@ -46,7 +46,7 @@ def _slab(levels, frame, axis, index):
 
 
 @njit(cache=True)
-def _box_reach(frame, origin, axes, half, reach):
+def _box_reach(frame: Floats, origin: Floats, axes: Floats, half: Floats, reach: Floats) -> float:
     """Half sizes (3,) of the box's axis-aligned bounds, into reach; returns a length far above rounding."""
     scale = 0.0
     for a in range(3):
@@ -60,7 +60,17 @@ def _box_reach(frame, origin, axes, half, reach):
 
 
 @njit(cache=True)
-def _clip_row(levels, frame, origin, axes, half, reach, pad, y, z):
+def _clip_row(
+    levels: Ints,
+    frame: Floats,
+    origin: Floats,
+    axes: Floats,
+    half: Floats,
+    reach: Floats,
+    pad: float,
+    y: int,
+    z: int,
+) -> tuple[int, int]:
     """First and last cell of the row (y, z) that may meet the oriented box; last < first if none does."""
     y0, y1 = _slab(levels, frame, 1, y)
     z0, z1 = _slab(levels, frame, 2, z)
@@ -81,7 +91,9 @@ def _clip_row(levels, frame, origin, axes, half, reach, pad, y, z):
 
 
 @njit(cache=True)
-def box_points(points, starts, levels, frame, origin, axes, half):
+def box_points(
+    points: Floats, starts: Cells, levels: Ints, frame: Floats, origin: Floats, axes: Floats, half: Floats
+) -> tuple[Floats, int]:
     """Box coordinates of the points of a box, in a buffer, and their number: by cell, sorted in each."""
     reach = np.empty(3)
     pad = _box_reach(frame, origin, axes, half, reach)
@@ -115,7 +127,17 @@ def box_points(points, starts, levels, frame, origin, axes, half):
 
 
 @njit(cache=True)
-def box_bins(points, starts, levels, frame, origin, axes, half, nx, ny):
+def box_bins(
+    points: Floats,
+    starts: Cells,
+    levels: Ints,
+    frame: Floats,
+    origin: Floats,
+    axes: Floats,
+    half: Floats,
+    nx: int,
+    ny: int,
+) -> Floats:
     """Box coordinates (m, 3) of the point nearest to the centre of every occupied bin, bin by bin."""
     reach = np.empty(3)
     pad = _box_reach(frame, origin, axes, half, reach)
@@ -151,7 +173,7 @@ def box_bins(points, starts, levels, frame, origin, axes, half, nx, ny):
 
 
 @njit(cache=True)
-def box_fault(origin, axes, half):
+def box_fault(origin: Floats, axes: Floats, half: Floats) -> int:
     """0 for a box; 1 for an origin that is not finite, 2 axes that are not orthonormal, 3 half sizes."""
     for a in range(3):
         if not abs(origin[a]) <= LIMIT:
@@ -166,7 +188,9 @@ def box_fault(origin, axes, half):
 
 
 @njit(cache=True)
-def ball_points(points, starts, levels, frame, centre, radius):
+def ball_points(
+    points: Floats, starts: Cells, levels: Ints, frame: Floats, centre: Floats, radius: float
+) -> tuple[Floats, int]:
     """The points within a radius, in a buffer, and their number: by cell, sorted in each."""
     spans = np.empty((3, 2), np.int64)
     for a in range(3):
