@@ -28,7 +28,7 @@ def main() -> None:
     x = np.linspace(-40.0, 40.0, 2001)
     path = np.column_stack([x, 14.0 * np.sin(x / 14.0)])  # no bend sharper than a radius of 14 mm
     clay = Winding(path, height, width)
-    scan = clay.points(n=10_000, region=100.0, noise=NOISE, seed=4)
+    scan = clay.points(n=10_000, region=100.0, noise=NOISE)
 
     ridge = rf.register(scan, at=(*path[600], height(clay.arc_length[600])))
 
