@@ -1,5 +1,6 @@
 """Register a ridge in a 3D scan as a feature with a height and a width that can be changed.
 
+Example:
     ridge = register(read_scan("clay.ply"), at=(12, -3.5, 0.8))
     ridge.resized(h=1.5).surface()
 """

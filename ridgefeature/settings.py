@@ -31,16 +31,22 @@ class Settings:
     optimiser: str = _setting(
         "auto", "name of a local NLopt algorithm; auto: LD_LBFGS for residual, LN_BOBYQA for M"
     )
-    loss: str = _setting("tukey", "robust loss of the final fit", LOSSES)
+    loss: str = _setting("tukey", "robust loss, where Huber's does not do", LOSSES)
     tuning: float = _setting(5.0, "tuning constant of the loss, in units of the noise scale")
-    section: str = _setting("auto", "cross-section", SECTION_CHOICES)
+    section: str = _setting(
+        "auto", "cross-section; auto: the bell, unless another is clearly better", SECTION_CHOICES
+    )
     length: float = _setting(0.8, "length of a template")
     longest: float = _setting(2.0, "factor by which templates grow longer where the data are poor")
     wanted_error: float = _setting(0.08, "relative error of the width above which templates grow longer")
     flank: float = _setting(0.3, "breadth of each flat flank that is fitted")
-    border: float = _setting(0.5, "breadth of the finished surface outside each foot")
-    max_evaluations: int = _setting(80, "evaluations allowed for one optimisation; ten times that for M")
-    tolerance: float = _setting(1e-3, "step that ends an optimisation, in units of one noise scale")
+    border: float = _setting(0.5, "breadth of the finished surface outside each foot; less in sharp bends")
+    max_evaluations: int = _setting(
+        80, "evaluations allowed for one optimisation; ten times that without gradient"
+    )
+    tolerance: float = _setting(
+        1e-3, "step that ends an optimisation of the final residual fit, in noise scales"
+    )
     march_width_change: float = _setting(
         1.5, "largest factor by which the width may change from template to template"
     )
@@ -94,9 +100,9 @@ class Settings:
             "auto or a local NLopt algorithm such as LD_SLSQP or LN_BOBYQA",
             self.optimiser,
         )
-        derivative_free = self.measure == "residual" or not self.optimiser.startswith("LD_")
+        has_what_it_needs = self.measure == "residual" or not self.optimiser.startswith("LD_")
         _check(
-            derivative_free,
+            has_what_it_needs,
             "optimiser",
             "auto or an LN_ algorithm for measure M, which has no gradient",
             self.optimiser,

@@ -99,7 +99,8 @@ def write_feature(ridge: Ridge, path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str]) -> Ridge:
     """Read a ridge feature that `Ridge.save` wrote; equal to it to the last bit.
 
-    Raises OSError if the file cannot be read, ValueError if it is no feature file, cut short or of another version.
+    Raises OSError if the file cannot be read, ValueError if it is no feature file, cut short or of another
+    version.
     """
     path = Path(path)
     try:
@@ -154,15 +155,17 @@ def _template(document: dict[str, Any], section: Section) -> Template:
             values[name] = _array(value)
             if values[name].shape != _TEMPLATE_ARRAYS[name]:
                 raise ValueError(
-                    f"expected a template's {name} of shape {_TEMPLATE_ARRAYS[name]}, got {values[name].shape}; "
-                    "save the feature again"
+                    f"expected a template's {name} of shape {_TEMPLATE_ARRAYS[name]}, "
+                    f"got {values[name].shape}; save the feature again"
                 )
         elif name in ("status", "std"):
             values[name] = value
         else:
             values[name] = _number(value)
             if isinstance(values[name], bool) or not isinstance(values[name], (int, float)):
-                raise ValueError(f"expected a template's {name} to be a number, got {value!r}; save the feature again")
+                raise ValueError(
+                    f"expected a template's {name} to be a number, got {value!r}; save the feature again"
+                )
     return Template(**values)
 
 
@@ -180,5 +183,6 @@ def _check_shapes(ridge: Ridge) -> None:
             or not (np.isfinite(array).all() or f.name.endswith("_std"))
         ):
             raise ValueError(
-                f"expected {f.name} of shape {want} and finite, got shape {array.shape}; save the feature again"
+                f"expected {f.name} of shape {want} and finite, got shape {array.shape}; "
+                "save the feature again"
             )
