@@ -112,16 +112,8 @@ def _moved(template: Template, start: Array, transform: Array, q: Array) -> Temp
 
 def sample(template: Template, along: int = 9, across: int = 21) -> Array:
     """Points (along * across, 3) spread evenly over the patch, flanks included, in the frame of the scan."""
-    x = ((np.arange(along) + 0.5) / along - 0.5) * template.length
-    y = ((np.arange(across) + 0.5) / across * 2 - 1) * template.half_breadth
-    bend, rise, widening = template.trend
-    local = np.empty((along, across, 3))
-    local[..., 0] = x[:, None]
-    local[..., 1] = y + 0.5 * bend * x[:, None] ** 2
-    local[..., 2] = (template.height + rise * x[:, None]) * template.section(
-        y / (template.width + widening * x[:, None])
-    )
-    return template.position + local.reshape(-1, 3) @ template.rotation.T
+    local = appraise.sampled(*template.shape, template.length, template.half_breadth, along, across)
+    return template.position + local @ template.rotation.T
 
 
 def _run(

@@ -20,6 +20,8 @@ Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
 _ALIKE = math.cos(math.radians(8.0))
+_POOR_START = 0.5
+"""Mean loss of a start, in noise scales, above which the other starts are looked at."""
 _HOPELESS = 3.0
 """Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
@@ -134,7 +136,7 @@ def _fit_next(
     """
     starts = append(chain, settings)
     starts, alike = _unlike(starts)
-    if len(starts) > 1:
+    if len(starts) > 1 and start_loss(rough, starts[0], chain[-1].scale) > _POOR_START:
         starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
     best: tuple[Template, Template, str] | None = None
     tries = [*((s, rough) for s in starts), *((s, rough) for s in alike), (starts[0], full)]

@@ -16,6 +16,7 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 
 _BINS = 16
+_SAME_LENGTH = 0.15
 
 
 def trends(templates: list[Template]) -> list[Template]:
@@ -69,7 +70,7 @@ def _change_point(window: Window, template: Template, reach: float, settings: Se
 
 def _trim_end(window: Window, templates: list[Template], settings: Settings) -> list[Template]:
     """Templates whose last one ends where the ridge does: shortened, lengthened or dropped."""
-    templates = trends(templates)
+    templates = [*templates[:-2], *trends(templates[-3:])[-2:]]
     while True:
         last = templates[-1]
         end = _change_point(window, _as_expected(templates), 1.5 * last.length, settings)
@@ -123,9 +124,9 @@ def place_ends(window: Window, track: Track, settings: Settings) -> Track:
 def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:
     """Limits of the i-th template about the mean of its neighbours."""
     near = [templates[k] for k in (i - 1, i + 1) if 0 <= k < len(templates)] or [templates[i]]
-    return limits_of(
-        float(np.mean([t.height for t in near])), float(np.mean([t.width for t in near])), settings
-    )
+    height = sum(t.height for t in near) / len(near)
+    width = sum(t.width for t in near) / len(near)
+    return limits_of(height, width, settings)
 
 
 def settle(window: Window, track: Track, settings: Settings) -> Track:
@@ -153,17 +154,19 @@ def misfit_scale(template: Template) -> float:
 
 
 def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
-    """The settled track without end templates that are no ridge, its ends placed again and refitted."""
+    """The settled track without end templates that are no ridge, its ends placed again.
+
+    An end template whose length changed much is refitted; one that dropped out is not replaced.
+    """
     templates = list(track.templates)
     while len(templates) > 1 and not _stands(templates[-1], settings):
         templates.pop()
     while len(templates) > 1 and not _stands(templates[0], settings):
         templates.pop(0)
-    placed = trends(list(place_ends(window, Track(tuple(templates), track.stop), settings).templates))
-    kept = {t.position.tobytes() for t in templates}
-    ends = [i for i in (0, len(placed) - 1) if placed[i].position.tobytes() not in kept]
-    for i in dict.fromkeys(ends):
-        placed[i] = _refit(window, placed, i, settings.marching())
+    placed = list(place_ends(window, Track(tuple(templates), track.stop), settings).templates)
+    for i, before in ((0, templates[0]), (-1, templates[-1])):
+        if abs(placed[i].length / before.length - 1) > _SAME_LENGTH:
+            placed[i] = _refit(window, placed, i % len(placed), settings.marching())
     return Track(tuple(placed), track.stop, track.misfit)
 
 

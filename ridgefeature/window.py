@@ -57,7 +57,7 @@ class Window:
                 max(round(np.sqrt(0.5 * self.most * ratio)), 1),
                 max(round(np.sqrt(0.5 * self.most / ratio)), 1),
             )
-        self._points = points_in_box(self.grid, centre, rotation.T, half, cells)
+        self._points = points_in_box(self.grid, centre, rotation.T, half, cells, check=False)
         self._held = (centre, rotation, half)
 
     def around(self, centre: Array, radius: float, frame: Array, most: int = 400) -> Array:

@@ -12,7 +12,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import solve_in_place, whitening
-from ridgefeature.kernels.residual import HUBER, INNER, OPTIONS, loss_jet, residual_jet, split, weight_of
+from ridgefeature.kernels.residual import (
+    HUBER,
+    INNER,
+    OPTIONS,
+    columns,
+    loss_jet,
+    residual_jet,
+    split,
+    weight_of,
+)
 
 Floats = NDArray[np.float64]
 
@@ -38,14 +47,6 @@ def losses(x: Floats, loss: int, tuning: float) -> Floats:
     for i in range(x.size):
         out[i] = loss_jet(x[i], loss, tuning)[0]
     return out
-
-
-@njit(**OPTIONS)
-def robust_scale(
-    points: Floats, height: float, width: float, trend: Floats, table: Floats, floor: float
-) -> float:
-    """Standard deviation of the residuals from the median of their absolute values, not below floor."""
-    return max(1.4826 * np.median(np.abs(residuals(points, height, width, trend, table))), floor)
 
 
 @njit(**OPTIONS)
@@ -103,24 +104,6 @@ def plane_loss(
 
 
 @njit(**OPTIONS)
-def evidence(
-    points: Floats,
-    height: float,
-    width: float,
-    trend: Floats,
-    table: Floats,
-    scale: float,
-    loss: int,
-    tuning: float,
-) -> float:
-    """Twice the loss that the best plane has more than the template: a log likelihood ratio, doubled."""
-    ridge = 0.0
-    for r in residuals(points, height, width, trend, table):
-        ridge += loss_jet(r / scale, loss, tuning)[0]
-    return 2.0 * (plane_loss(points, scale, loss, tuning, 5)[0] - ridge)
-
-
-@njit(**OPTIONS)
 def explained(points: Floats, height: float, width: float, trend: Floats, table: Floats) -> float:
     """Log of the mean absolute residual of the best plane over the template's, both clipped at the height.
 
@@ -148,56 +131,61 @@ def assess(
     loss: int,
     tuning: float,
 ) -> tuple[float, float, float]:
-    """Robust scale, share of points beyond three scales, evidence at a scale of at least `contrast`."""
-    scale = robust_scale(points, height, width, trend, table, floor)
-    far = mean_loss(points, height, width, trend, table, scale, HUBER, tuning)[1]
-    return scale, far, evidence(points, height, width, trend, table, max(scale, contrast), loss, tuning)
+    """Robust scale, not below floor; share of points beyond three scales; evidence.
+
+    The scale is the standard deviation that the median absolute residual tells. Evidence is twice the loss that
+    the best plane has more than the template, a log likelihood ratio, at a scale of at least `contrast`.
+    """
+    r = residuals(points, height, width, trend, table)
+    scale = max(1.4826 * np.median(np.abs(r)), floor)
+    unit = max(scale, contrast)
+    far = 0
+    ridge = 0.0
+    for i in range(r.size):
+        far += abs(r[i]) > 3.0 * scale
+        ridge += loss_jet(r[i] / unit, loss, tuning)[0]
+    return scale, far / r.size, 2.0 * (plane_loss(points, unit, loss, tuning, 5)[0] - ridge)
 
 
 @njit(**INNER)
-def _write_row(
-    row: Floats, x: float, y: float, z: float, r_x: float, r_y: float, r_z: float, r_h: float, r_w: float
-) -> None:
-    """Write the residual's derivatives by a template's eight parameters, where it stands, into row (8,)."""
-    row[0], row[1], row[2] = -r_x, -r_y, -r_z
-    row[3], row[4], row[5] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
-    row[6], row[7] = r_h, r_w
+def _rows(
+    points: Floats, height: float, width: float, trend: Floats, table: Floats
+) -> tuple[Floats, tuple[Floats, ...]]:
+    """Residuals (n,), and seven rows (n,): their derivatives by all parameters but the first, sliding.
 
-
-@njit(**OPTIONS)
-def precondition(
-    points: Floats,
-    height: float,
-    width: float,
-    trend: Floats,
-    table: Floats,
-    scale: float,
-    prior_weight: Floats,
-) -> Floats:
-    """Whitening transform (8, 7) of the mean Huber loss of a template as it stands."""
+    Rows apart from each other, so that the loop and the sums of `_gram` run in SIMD.
+    """
     bend, rise, widening = trend[0], trend[1], trend[2]
     constant, linear, quadratic, cubic = split(table)
-    normal = np.zeros((8, 8))
-    row = np.empty(8)
-    inverse_scale = 1.0 / scale
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
+    column_x, column_y, column_z = columns(points)
+    n = column_x.size
+    r = np.empty(n)
+    d1, d2, d3, d4 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    d5, d6, d7 = np.empty(n), np.empty(n), np.empty(n)
+    for i in range(n):
+        x, y, z = column_x[i], column_y[i], column_z[i]
+        r[i], r_x, r_y, r_z, r_h, r_w = residual_jet(
             x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
         )
-        root = inverse_scale * math.sqrt(weight_of(r * inverse_scale, HUBER, 1.345))
-        _write_row(row, x, y, z, r_x, r_y, r_z, r_h, r_w)
-        for j in range(8):
-            row[j] *= root
-        for j in range(8):
-            for k in range(j + 1):
-                normal[j, k] += row[j] * row[k]
-    for j in range(8):
+        d1[i], d2[i] = -r_y, -r_z
+        d3[i], d4[i], d5[i] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
+        d6[i], d7[i] = r_h, r_w
+    return r, (d1, d2, d3, d4, d5, d6, d7)
+
+
+@njit(**INNER)
+def _gram(rows: tuple[Floats, ...], weights: Floats) -> Floats:
+    """Weighted sums (7, 7) of the products of seven rows."""
+    normal = np.empty((7, 7))
+    for j in range(7):
         for k in range(j + 1):
-            normal[j, k] /= points.shape[0]
-            normal[k, j] = normal[j, k]
-        normal[j, j] += prior_weight[j] / points.shape[0]
-    return whitening(normal)
+            a, b = rows[j], rows[k]
+            total = 0.0
+            for i in range(weights.size):
+                total += weights[i] * a[i] * b[i]
+            normal[j, k] = total
+            normal[k, j] = total
+    return normal
 
 
 @njit(**OPTIONS)
@@ -210,9 +198,17 @@ def prepare(
     floor: float,
     prior_weight: Floats,
 ) -> tuple[float, Floats]:
-    """Robust scale and whitening transform of a template as it stands."""
-    scale = robust_scale(points, height, width, trend, table, floor)
-    return scale, precondition(points, height, width, trend, table, scale, prior_weight)
+    """Robust scale of a template as it stands, and the whitening transform (8, 7) of its mean Huber loss."""
+    r, rows = _rows(points, height, width, trend, table)
+    scale = max(1.4826 * np.median(np.abs(r)), floor)
+    weights = np.empty(r.size)
+    for i in range(r.size):
+        weights[i] = weight_of(r[i] / scale, HUBER, 1.345) / (scale * scale * r.size)
+    normal = np.zeros((8, 8))
+    normal[1:, 1:] = _gram(rows, weights)
+    for j in range(8):
+        normal[j, j] += prior_weight[j] / r.size
+    return scale, whitening(normal)
 
 
 @njit(**OPTIONS)
@@ -231,34 +227,25 @@ def deviations(
     The asymptotic variance of an M-estimator (Huber 1981, 7.6) with its small-sample factor, from the points
     within `tuning` scales. Infinite where the points do not tell. The first, sliding, is fixed: 0.
     """
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    normal = np.zeros((8, 8))
-    row = np.empty(8)
+    r, rows = _rows(points, height, width, trend, table)
+    inside = np.zeros(r.size)
     inliers = 0
     psi_square = psi_slope = 0.0
     step = 1e-4
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
-            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
-        )
-        s = r / scale
-        if not abs(s) < tuning:
-            continue
-        inliers += 1
-        psi_square += loss_jet(s, loss, tuning)[1] ** 2
-        psi_slope += (loss_jet(s + step, loss, tuning)[1] - loss_jet(s - step, loss, tuning)[1]) / (2 * step)
-        _write_row(row, x, y, z, r_x, r_y, r_z, r_h, r_w)
-        for j in range(8):
-            for k in range(j + 1):
-                normal[j, k] += row[j] * row[k]
+    for i in range(r.size):
+        s = r[i] / scale
+        if abs(s) < tuning:
+            inside[i] = 1.0
+            inliers += 1
+            psi_square += loss_jet(s, loss, tuning)[1] ** 2
+            above, below = loss_jet(s + step, loss, tuning)[1], loss_jet(s - step, loss, tuning)[1]
+            psi_slope += (above - below) / (2 * step)
     std = np.full(8, np.inf)
     std[0] = 0.0
     if inliers <= 8 or not psi_slope > 0.0:
         return std, inliers
     factor = scale * scale * psi_square * inliers * inliers / (psi_slope * psi_slope * (inliers - 7))
-    free = normal[1:, 1:]
+    free = _gram(rows, inside)
     column = np.empty(7)
     for i in range(7):
         column[:] = 0.0
@@ -283,3 +270,34 @@ def add_misfit(
         if k < bins.shape[1]:
             bins[0, k] += 1.0
             bins[1, k] += min(max(r[i] / scale, -2.0), 2.0)
+
+
+@njit(**OPTIONS)
+def sampled(
+    height: float,
+    width: float,
+    trend: Floats,
+    table: Floats,
+    length: float,
+    half_breadth: float,
+    along: int,
+    across: int,
+) -> Floats:
+    """Points (along * across, 3) at the middles of as many equal cells of a template, in its frame."""
+    constant, linear, quadratic, cubic = split(table)
+    spans = constant.size - 2.0
+    out = np.empty((along * across, 3))
+    for i in range(along):
+        x = ((i + 0.5) / along - 0.5) * length
+        for j in range(across):
+            y = ((j + 0.5) / across * 2.0 - 1.0) * half_breadth
+            position = (y / max(width + trend[2] * x, 0.1 * width) + 0.5) * spans + 1.0
+            position = min(max(position, 0.5), spans + 1.5)
+            span = np.int64(position)
+            t = position - span
+            g = constant[span] + t * (linear[span] + t * (quadratic[span] + t * cubic[span]))
+            k = i * across + j
+            out[k, 0] = x
+            out[k, 1] = y + 0.5 * trend[0] * x * x
+            out[k, 2] = (height + trend[1] * x) * g
+    return out
