@@ -34,8 +34,10 @@ def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:
     More than chance: a chi-square test. Enough: one per cent of the height somewhere.
     """
     count, total = misfit
+    if not any(t.height for t in templates):
+        return False
     square = float((total**2 / np.maximum(count, 1.0)).sum())
-    noise = float(np.median([misfit_scale(t) / abs(t.height) for t in templates]))
+    noise = float(np.median([misfit_scale(t) / abs(t.height) for t in templates if t.height]))
     shift = float(np.abs(total / np.maximum(count, 30.0)).max()) * noise
     return square > len(count) + 6.0 * np.sqrt(2.0 * len(count)) and shift > _SMALLEST_SHIFT
 
@@ -106,7 +108,7 @@ def _collapsed(window: Window, templates: tuple[Template, ...]) -> tuple[Array, 
     """Points of all windows as y / width and z / height, with the noise scale in heights."""
     rows = []
     step = max(sum(t.points for t in templates) // _MOST, 1)
-    for t in templates:
+    for t in (t for t in templates if t.height):
         points = window(t)
         # By x, so that the choice does not depend on how the scan is turned.
         x, y, z = points[np.argsort(points[:, 0], kind="stable")[::step]].T

@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
+_RAN_BACK = "it ran back into itself"
+GOES_ON = (INTERRUPTED, _RAN_BACK, "max_templates")
+"""How the reasons of a march begin that stopped though the ridge goes on."""
 _ALIKE = math.cos(math.radians(8.0))
 _POOR_START = 0.5
 """Mean loss of a start, in noise scales, above which the other starts are looked at."""
@@ -185,7 +188,7 @@ def march_one_way(
             chain.append(start)
             continue
         if _meets(fitted, [*known, *found][:-2]):
-            return reason or "it ran back into itself"
+            return reason or _RAN_BACK
         reason, skipped = "", 0.0
         found.append(fitted)
         chain.append(fitted)

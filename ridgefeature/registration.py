@@ -153,10 +153,18 @@ def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Templa
 
 
 def _spacing(grid: Grid, pick: Array) -> float:
-    """Median distance between neighbours near the pick: the same however the scan is turned."""
+    """Median distance between neighbours near the pick: the same however the scan is turned.
+
+    Raises ValueError where points are repeated so often that no spacing can be told.
+    """
     near = nearest(grid, pick[None], min(_NEAR, len(grid.points)))[1][0]
     apart = nearest_distances(grid, near, 2)[:, 1]
-    return float(np.median(apart[apart > 0])) if (apart > 0).any() else typical_spacing(grid)
+    spacing = float(np.median(apart[apart > 0])) if (apart > 0).any() else typical_spacing(grid)
+    if not spacing > 0:
+        raise ValueError(
+            "scan: expected points that lie apart, got most of them repeated; drop the repeated ones"
+        )
+    return spacing
 
 
 def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:

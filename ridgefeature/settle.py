@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_of, refine
 from ridgefeature.kernels import appraise
 from ridgefeature.kernels.algebra import rotation_of
-from ridgefeature.march import Track, reverse
+from ridgefeature.march import GOES_ON, Track, reverse
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -108,17 +108,21 @@ def _relength(template: Template, low: float, high: float) -> Template:
     return template.changed(
         position=template.position + template.rotation @ shift,
         rotation=template.rotation @ turn,
-        length=high - low,
-        height=template.height + template.trend[1] * middle,
-        width=max(template.width + template.trend[2] * middle, 0.5 * template.width),
+        length=float(high - low),
+        height=float(template.height + template.trend[1] * middle),
+        width=float(max(template.width + template.trend[2] * middle, 0.5 * template.width)),
     )
 
 
 def place_ends(window: Window, track: Track, settings: Settings) -> Track:
-    """The track with both end templates cut to where the ridge ends."""
-    templates = _trim_end(window, list(track.templates), settings)
-    templates = [reverse(t) for t in _trim_end(window, [reverse(t) for t in reversed(templates)], settings)]
-    return Track(tuple(reversed(templates)), track.stop)
+    """The track with its end templates cut to where the ridge ends, unless it goes on beyond the march."""
+    templates = list(track.templates)
+    if not track.stop[1].startswith(GOES_ON):
+        templates = _trim_end(window, templates, settings)
+    if not track.stop[0].startswith(GOES_ON):
+        backwards = _trim_end(window, [reverse(t) for t in reversed(templates)], settings)
+        templates = [reverse(t) for t in reversed(backwards)]
+    return Track(tuple(templates), track.stop)
 
 
 def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:

@@ -61,12 +61,15 @@ def test_loss_and_weight_follow_their_formulas(name):
     np.testing.assert_allclose(weights * x, psi(x, name, tuning), atol=1e-13)
 
 
-def test_robust_scale_is_the_scaled_median_and_never_below_its_floor():
+def test_the_robust_scale_is_the_scaled_median_and_never_below_its_floor():
     points = noisy()
     r = residual(points, 3.0, 8.0, NO_TREND, bell())
-    found = appraise.robust_scale(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9)
+    weights, huber = np.ones(8), (LOSSES["huber"], 1.345)
+    found, _ = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, weights)
     assert found == pytest.approx(1.4826 * np.median(np.abs(r)), rel=1e-12)
-    assert appraise.robust_scale(points, 3.0, 8.0, NO_TREND, bell().table, 0.7) == 0.7
+    assert appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, weights)[0] == 0.7
+    assert appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)[0] == found
+    assert appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, 0.5, *huber)[0] == 0.7
 
 
 def test_mean_loss_counts_the_share_beyond_three_scales():
@@ -130,13 +133,13 @@ def test_the_objective_is_the_mean_loss_of_the_moved_residuals_plus_the_prior(na
     assert value_and_gradient(q, arguments)[0] == pytest.approx(expected, rel=1e-11)
 
 
-def test_precondition_whitens_the_objective_where_it_stands():
+def test_prepare_whitens_the_objective_where_it_stands():
     """Seen through the transform the mean Huber loss has unit curvature along every placement, h and w."""
     points, _ = straight_ridge(300, noise=0.1, seed=5, half=(4, 6))
     prior = np.zeros((2, 8))
     start = np.array([0, 0, 0, 0, 0, 0, 3.0, 8.0])
-    transform = appraise.precondition(points, 3.0, 8.0, NO_TREND, bell().table, 0.1, prior[1])
-    arguments = (transform, start, prior, NO_TREND, points, bell().table, 0.1, LOSSES["huber"], 1.345)
+    scale, transform = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.1, prior[1])
+    arguments = (transform, start, prior, NO_TREND, points, bell().table, scale, LOSSES["huber"], 1.345)
     step = 1e-2
     rows = [
         (value_and_gradient(step * e, arguments)[1] - value_and_gradient(-step * e, arguments)[1])
@@ -205,7 +208,10 @@ def test_the_robust_plane_loss_is_the_smallest_there_is():
 @pytest.mark.parametrize(("height", "sign"), [(3.0, 1), (0.0, -1)], ids=["ridge", "flat"])
 def test_evidence_is_twice_what_a_plane_loses_against_the_template(height, sign):
     points, _ = straight_ridge(300, height=height, noise=0.1, seed=4, half=(4, 6))
-    found = appraise.evidence(points, 3.0, 8.0, NO_TREND, bell().table, 0.5, LOSSES["huber"], 1.345)
+    huber = LOSSES["huber"], 1.345
+    _, far, found = appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)
+    r = residual(points, 3.0, 8.0, NO_TREND, bell())
+    assert far == pytest.approx(np.mean(np.abs(r) > 3 * 1.4826 * np.median(np.abs(r))))
     ridge = loss(residual(points, 3.0, 8.0, NO_TREND, bell()) / 0.5, "huber", 1.345).sum()
     expected = 2 * (robust_plane(points, 0.5, "huber", 1.345) - ridge)
     assert found == pytest.approx(expected, rel=2e-3)  # it stops reweighting after five rounds
@@ -218,6 +224,16 @@ def test_explained_grows_with_what_the_ridge_explains():
     poor = appraise.explained(points, 2.0, 5.0, NO_TREND, bell().table)
     wrong = appraise.explained(points, -3.0, 8.0, NO_TREND, bell().table)
     assert good > 1 > poor > 0 > wrong
+
+
+def test_sampled_points_lie_on_the_template():
+    points = appraise.sampled(3.0, 8.0, BEND, bell().table, 6.0, 7.0, 5, 9)
+    assert points.shape == (45, 3)
+    np.testing.assert_allclose(np.unique(points[:, 0]), [-2.4, -1.2, 0.0, 1.2, 2.4], atol=1e-15)
+    y = points[:, 1] - 0.5 * BEND[0] * points[:, 0] ** 2
+    assert np.abs(y).max() == pytest.approx(7.0 * 8 / 9)
+    height, width = 3.0 + BEND[1] * points[:, 0], 8.0 + BEND[2] * points[:, 0]
+    np.testing.assert_allclose(points[:, 2], height * bell()(y / width), atol=1e-12)
 
 
 # Search of GUESS

@@ -123,26 +123,25 @@ def test_turned_facing_and_cross_are_rodrigues_projection_and_product():
     np.testing.assert_array_equal(algebra.cross(normal, direction), np.cross(normal, direction))
 
 
-def test_walk_goes_straight_without_bend():
-    place, frame = algebra.walk(np.zeros(3), np.array([0.0, 0, 1]), np.array([2.0, 0, 0]), 0.0, 3.0, 4.0)
+def test_walk_goes_straight_on_from_the_joint_without_bend():
+    joint, up = np.array([3.0, 0, 0]), np.array([0.0, 0, 1])
+    place, frame = algebra.walk(joint, up, np.array([2.0, 0, 0]), 0.0, 3.0, 4.0)
     np.testing.assert_allclose(place, [7, 0, 0], atol=1e-15)
     np.testing.assert_allclose(frame, np.eye(3), atol=1e-15)
 
 
-def test_walk_turns_with_the_path_and_has_its_joint_on_it():
+def test_walk_turns_with_the_path_and_begins_at_the_joint():
     radius, first, second = 30.0, 3.0, 4.0
-    up, ahead = np.array([0.0, 0, 1]), np.array([1.0, 0, 0])
-    place, frame = algebra.walk(np.zeros(3), up, ahead, 1 / radius, first, second)
-    at_joint, at_end = first / radius, (first + second) / radius
-    np.testing.assert_allclose(frame[:, 0], [np.cos(at_end), np.sin(at_end), 0], atol=1e-12)
-    joint = place - second * frame[:, 0]
-    on_circle = radius * np.array([np.sin(at_joint), 1 - np.cos(at_joint), 0])
-    np.testing.assert_allclose(joint, on_circle, atol=0.01 * first)
+    joint, up, ahead = np.array([3.0, 1, 0]), np.array([0.0, 0, 1]), np.array([1.0, 0, 0])
+    place, frame = algebra.walk(joint, up, ahead, 1 / radius, first, second)
+    turn = (first + second) / radius
+    np.testing.assert_allclose(frame[:, 0], [np.cos(turn), np.sin(turn), 0], atol=1e-12)
+    np.testing.assert_allclose(place - second * frame[:, 0], joint, atol=1e-14)
 
 
-def test_walk_turns_by_half_a_radian_at_most():
+def test_walk_turns_by_a_radian_at_most():
     frame = algebra.walk(np.zeros(3), np.array([0.0, 0, 1]), np.array([1.0, 0, 0]), 1.0, 30.0, 30.0)[1]
-    assert np.arctan2(frame[1, 0], frame[0, 0]) == pytest.approx(1.0)  # both stretches together
+    assert np.arctan2(frame[1, 0], frame[0, 0]) == pytest.approx(1.0)
 
 
 # Windows

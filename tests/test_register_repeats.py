@@ -15,7 +15,6 @@ def test_a_scan_given_twice_over_is_the_same_ridge_within_its_bands():
     assert twice.height.max() == pytest.approx(spiral_ridge().height.max(), rel=0.03)
 
 
-@pytest.mark.xfail(strict=True, raises=OverflowError, reason="a spacing of 0 overflows in Window.around")
 def test_points_that_are_all_repeated_often_end_in_a_value_error():
     points = np.repeat(np.random.default_rng(0).normal(size=(40, 3)), 200, axis=0)
     with pytest.raises(ValueError, match="point"):

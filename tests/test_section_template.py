@@ -10,7 +10,8 @@ from oracles import section_values, template_at
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from ridgefeature import Section
+from ridgefeature import Section, Template
+from ridgefeature.learn import in_doubt
 from ridgefeature.merge import LEAST_BORDER, section_knots, section_poles, template_surface
 from ridgefeature.section import bell, plateau
 
@@ -163,3 +164,10 @@ def test_changed_is_what_replace_gives():
     np.testing.assert_array_equal(other.rotation, turn)
     with pytest.raises(AttributeError):
         other.height = 1.0
+
+
+def test_a_flat_template_among_others_does_not_hinder_the_choice_of_the_section():
+    flat = Template(np.zeros(3), np.eye(3), 8.0, 0.0, 6.0, 2.0, bell(), scale=0.1)
+    misfit = np.array([np.full(16, 100.0), np.full(16, 50.0)])
+    assert not in_doubt(misfit, (flat,))
+    assert in_doubt(misfit, (flat, flat.changed(height=3.0)))

@@ -133,8 +133,8 @@ def assess(
 ) -> tuple[float, float, float]:
     """Robust scale, not below floor; share of points beyond three scales; evidence.
 
-    The scale is the standard deviation that the median absolute residual tells. Evidence is twice the loss that
-    the best plane has more than the template, a log likelihood ratio, at a scale of at least `contrast`.
+    The scale is the standard deviation that the median absolute residual tells. Evidence is twice the loss
+    that the best plane has more than the template, a log likelihood ratio, at a scale of at least `contrast`.
     """
     r = residuals(points, height, width, trend, table)
     scale = max(1.4826 * np.median(np.abs(r)), floor)
@@ -284,20 +284,17 @@ def sampled(
     across: int,
 ) -> Floats:
     """Points (along * across, 3) at the middles of as many equal cells of a template, in its frame."""
-    constant, linear, quadratic, cubic = split(table)
-    spans = constant.size - 2.0
+    spans = table.shape[0] - 2.0
     out = np.empty((along * across, 3))
     for i in range(along):
         x = ((i + 0.5) / along - 0.5) * length
         for j in range(across):
             y = ((j + 0.5) / across * 2.0 - 1.0) * half_breadth
-            position = (y / max(width + trend[2] * x, 0.1 * width) + 0.5) * spans + 1.0
-            position = min(max(position, 0.5), spans + 1.5)
+            eta = y / max(width + trend[2] * x, 0.1 * width)
+            position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
             span = np.int64(position)
             t = position - span
-            g = constant[span] + t * (linear[span] + t * (quadratic[span] + t * cubic[span]))
-            k = i * across + j
-            out[k, 0] = x
-            out[k, 1] = y + 0.5 * trend[0] * x * x
-            out[k, 2] = (height + trend[1] * x) * g
+            g = table[span, 0] + t * (table[span, 1] + t * (table[span, 2] + t * table[span, 3]))
+            row = out[i * across + j]
+            row[0], row[1], row[2] = x, y + 0.5 * trend[0] * x * x, (height + trend[1] * x) * g
     return out
