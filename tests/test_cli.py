@@ -176,7 +176,7 @@ def test_export_by_suffix_and_rates(feature: Path, tmp_path: Path) -> None:
     assert tops[1] == pytest.approx(1.5 * tops[0], rel=0.03)
     assert tops[2] == pytest.approx(tops[1], rel=1e-3)
     assert run("export", feature, "-o", tmp_path / "d.stl").exit_code == 0
-    assert rf.read_scan(tmp_path / "d.stl", sample=500).bounds[1, 2] == pytest.approx(tops[0], rel=0.05)
+    assert rf.read_scan(tmp_path / "d.stl", vertices=True).bounds[1, 2] == pytest.approx(tops[0], rel=0.05)
     assert len(list(tmp_path.iterdir())) == 4
 
 
