@@ -40,8 +40,7 @@ class Section:
                 f"section coefficients: expected one or more finite numbers, one of them positive, "
                 f"got {self.coefficients!r}"
             )
-        apex = _table(raised)
-        raised = raised / _largest(apex)
+        raised = raised / _largest(_table(raised))
         raised.setflags(write=False)
         table = _table(raised)
         table.setflags(write=False)
