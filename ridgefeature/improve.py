@@ -9,9 +9,11 @@ import nlopt
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.kernels import appraise
-from ridgefeature.kernels import residual as kernel
+from ridgefeature.kernels import appraise, residual
 from ridgefeature.kernels.algebra import moved
+from ridgefeature.kernels.fit import bounds, fit
+from ridgefeature.kernels.objective import objective
+from ridgefeature.optimise import c_functions, minimise, status_of
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -26,8 +28,13 @@ _LEAST_SCALE = 5e-3
 _LEAST_CONTRAST = 0.05
 """Least noise scale of evidence, in parts of the height, so that misfit of the model does not count."""
 
-_LOSS = {"huber": kernel.HUBER, "tukey": kernel.TUKEY, "square": kernel.SQUARE, "cauchy": kernel.CAUCHY}
-_HUBER = (kernel.HUBER, 1.345)
+_LOSS = {
+    "huber": residual.HUBER,
+    "tukey": residual.TUKEY,
+    "square": residual.SQUARE,
+    "cauchy": residual.CAUCHY,
+}
+_HUBER = (residual.HUBER, 1.345)
 _ROUGH = 1e-2
 _AGREE = 0.1
 _FEW_OUTLIERS = 0.02
@@ -37,12 +44,17 @@ _FEW_OUTLIERS = 0.02
 class Limits:
     """What a fit may do to height and width: bounds, and what is expected with its reciprocal variances."""
 
-    narrowest: float
-    widest: float
     lowest: float
     highest: float
+    narrowest: float
+    widest: float
     prior: Array
     """(2, 8) expected increments, height and width, and their reciprocal variances."""
+
+    @property
+    def range(self) -> tuple[float, float, float, float]:
+        """The four bounds, as kernels.fit takes them."""
+        return self.lowest, self.highest, self.narrowest, self.widest
 
 
 def limits_of(height: float, width: float, settings: Settings) -> Limits:
@@ -53,10 +65,10 @@ def limits_of(height: float, width: float, settings: Settings) -> Limits:
     size = abs(height) + 0.1 * width
     deviation = np.array([width, 0.25 * width, 0.5 * size, *_LEAN, 2 * drift * size, drift * width])
     return Limits(
-        width / change,
-        width * change,
         min(low, high),
         max(low, high),
+        width / change,
+        width * change,
         np.array([[0, 0, 0, 0, 0, 0, height, width], deviation**-2.0]),
     )
 
@@ -79,70 +91,75 @@ def _minimise(
     settings: Settings,
 ) -> tuple[Template, int, str]:
     """The template after one optimisation on a fixed window (points in its frame), evaluations and status."""
-    h, w, trend, table = template.shape
-    prior = limits.prior
-    scale, transform = appraise.prepare(points, *template.shape, _floor(template), prior[1])
-    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, h, w])
-    number, tuning = loss
-    objective = kernel.objective
+    most = settings.max_evaluations * (1 if settings.algorithm.startswith("LD_") else 10)
+    c = c_functions()
+    if c is None:
+        _, transform, problem = appraise.prepare(
+            points, *template.shape, _floor(template), limits.prior, *loss
+        )
 
-    def value(q: Array, gradient: Array) -> float:
-        return objective(q, gradient, transform, start, prior, trend, points, table, scale, number, tuning)
+        def value(q: Array, gradient: Array) -> float:
+            return objective(q, gradient, problem)
 
-    return _run(value, template, start, transform, tolerance, limits, settings)
+        return _minimise_in_python(value, template, transform, tolerance, most, limits, settings)
+    position, rotation, height, width, evaluations, result = fit(
+        c,
+        points,
+        template.position,
+        template.rotation,
+        *template.shape,
+        _floor(template),
+        limits.prior,
+        *loss,
+        limits.range,
+        tolerance,
+        most,
+        getattr(nlopt, settings.algorithm),
+    )
+    fitted = template.changed(position=position, rotation=rotation, height=height, width=width)
+    return fitted, evaluations, status_of(result)
 
 
 def _minimise_distance(
     window: Window, template: Template, limits: Limits, settings: Settings
 ) -> tuple[Template, int, str]:
     """The template after one optimisation of its mean distance M to the scan (Eq. 3, 4); as `_minimise`."""
-    scale, transform = appraise.prepare(window(template), *template.shape, _floor(template), limits.prior[1])
-    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, template.height, template.width])
+    scale, transform, _ = appraise.prepare(
+        window(template), *template.shape, _floor(template), limits.prior, *_HUBER
+    )
 
     def value(q: Array, _: Array) -> float:
-        return window.mean_distance(sample(_moved(template, start, transform, q)), settings.k) / scale
+        return window.mean_distance(sample(_moved(template, transform, q)), settings.k) / scale
 
-    return _run(value, template, start, transform, 1e-3, limits, settings)
+    most = 10 * settings.max_evaluations
+    return _minimise_in_python(value, template, transform, 1e-3, most, limits, settings)
 
 
-def _moved(template: Template, start: Array, transform: Array, q: Array) -> Template:
-    position, rotation, height, width = moved(template.position, template.rotation, start, transform, q)
+def _minimise_in_python(
+    value: Callable[[Array, Array], float],
+    template: Template,
+    transform: Array,
+    tolerance: float,
+    most: int,
+    limits: Limits,
+    settings: Settings,
+) -> tuple[Template, int, str]:
+    low, high = bounds(template.height, template.width, transform, limits.range)
+    q, evaluations, result = minimise(value, low, high, tolerance, most, settings.algorithm)
+    return _moved(template, transform, q), evaluations, status_of(result)
+
+
+def _moved(template: Template, transform: Array, q: Array) -> Template:
+    position, rotation, height, width = moved(
+        template.position, template.rotation, template.height, template.width, transform, q
+    )
     return template.changed(position=position, rotation=rotation, height=height, width=width)
 
 
 def sample(template: Template, along: int = 9, across: int = 21) -> Array:
     """Points (along * across, 3) spread evenly over the patch, flanks included, in the frame of the scan."""
-    local = appraise.sampled(*template.shape, template.length, template.half_breadth, along, across)
+    local = residual.sampled(*template.shape, template.length, template.half_breadth, along, across)
     return template.position + local @ template.rotation.T
-
-
-def _run(
-    value: Callable[[Array, Array], float],
-    template: Template,
-    start: Array,
-    transform: Array,
-    tolerance: float,
-    limits: Limits,
-    settings: Settings,
-) -> tuple[Template, int, str]:
-    """Minimise value(q, gradient) from q = 0 within the limits: template moved, evaluations, status."""
-    h, w = template.height, template.width
-    optimiser = nlopt.opt(getattr(nlopt, settings.algorithm), 7)
-    optimiser.set_min_objective(value)
-    low, high = np.full(7, -np.inf), np.full(7, np.inf)
-    low[5], high[5] = (limits.lowest - h) / transform[6, 5], (limits.highest - h) / transform[6, 5]
-    low[6], high[6] = (limits.narrowest - w) / transform[7, 6], (limits.widest - w) / transform[7, 6]
-    optimiser.set_lower_bounds(np.minimum(low, 0.0))
-    optimiser.set_upper_bounds(np.maximum(high, 0.0))
-    optimiser.set_xtol_abs(tolerance)
-    optimiser.set_ftol_rel(tolerance * tolerance)
-    optimiser.set_maxeval(settings.max_evaluations * (1 if settings.algorithm.startswith("LD_") else 10))
-    try:
-        q = optimiser.optimize(np.zeros(7))
-        status = "limit" if optimiser.last_optimize_result() == nlopt.MAXEVAL_REACHED else "converged"
-    except (nlopt.RoundoffLimited, nlopt.runtime_error):
-        return template, optimiser.get_numevals(), "failed"
-    return _moved(template, start, transform, q), optimiser.get_numevals(), status
 
 
 def sized(template: Template, settings: Settings) -> Template:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles import LOSSES, NO_TREND, jacobian, loss, moved_residual, psi, residual, straight_ridge
 from scipy.optimize import minimize
 
-from ridgefeature.kernels import appraise
+from ridgefeature.kernels import appraise, objective
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.kernels.search import best_straight_ridge
 from ridgefeature.section import bell, plateau
@@ -64,10 +64,10 @@ def test_loss_and_weight_follow_their_formulas(name):
 def test_the_robust_scale_is_the_scaled_median_and_never_below_its_floor():
     points = noisy()
     r = residual(points, 3.0, 8.0, NO_TREND, bell())
-    weights, huber = np.ones(8), (LOSSES["huber"], 1.345)
-    found, _ = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, weights)
+    prior, huber = np.ones((2, 8)), (LOSSES["huber"], 1.345)
+    found = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, prior, *huber)[0]
     assert found == pytest.approx(1.4826 * np.median(np.abs(r)), rel=1e-12)
-    assert appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, weights)[0] == 0.7
+    assert appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, prior, *huber)[0] == 0.7
     assert appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)[0] == found
     assert appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, 0.5, *huber)[0] == 0.7
 
@@ -93,12 +93,12 @@ def problem(seed: int, name: str, with_prior: bool, with_trend: bool):
         prior = np.array([[0, 0.1, 0, 0, 0.05, 0, 2.5, 7.0], random.uniform(0.1, 40.0, 8)])
     trend = BEND if with_trend else NO_TREND
     section = SECTIONS[seed % 2]
-    return (transform, start, prior, trend, noisy(seed=seed), section.table, 0.15, LOSSES[name], TUNING[name])
+    return (noisy(seed=seed), start, prior, trend, transform, section.table, 0.15, LOSSES[name], TUNING[name])
 
 
-def value_and_gradient(q: np.ndarray, arguments) -> tuple[float, np.ndarray]:
+def value_and_gradient(q: np.ndarray, packed: np.ndarray) -> tuple[float, np.ndarray]:
     gradient = np.empty(7)
-    return kernel.objective(q, gradient, *arguments), gradient
+    return objective.objective(q, gradient, packed), gradient
 
 
 @pytest.mark.parametrize("name", LOSSES)
@@ -110,11 +110,11 @@ def value_and_gradient(q: np.ndarray, arguments) -> tuple[float, np.ndarray]:
 )
 @settings(max_examples=25, deadline=None, derandomize=True)
 def test_the_gradient_of_the_objective_is_that_of_central_differences(name, seed, prior, trend, q):
-    arguments, q = problem(seed, name, prior, trend), np.array(q)
-    _, gradient = value_and_gradient(q, arguments)
+    packed, q = objective.pack(*problem(seed, name, prior, trend)), np.array(q)
+    _, gradient = value_and_gradient(q, packed)
     for step in (1e-5, 1e-6):  # a point on a kink of a second derivative spoils one step, not both
         ends = np.array(
-            [[kernel.objective(q + s * e, np.empty(0), *arguments) for s in (step, -step)] for e in np.eye(7)]
+            [[objective.objective(q + s * e, np.empty(0), packed) for s in (step, -step)] for e in np.eye(7)]
         )
         differences = (ends[:, 0] - ends[:, 1]) / (2 * step)
         if np.allclose(gradient, differences, rtol=1e-6, atol=1e-6 * (1 + np.abs(gradient).max())):
@@ -125,25 +125,36 @@ def test_the_gradient_of_the_objective_is_that_of_central_differences(name, seed
 @pytest.mark.parametrize("name", LOSSES)
 def test_the_objective_is_the_mean_loss_of_the_moved_residuals_plus_the_prior(name):
     arguments = problem(8, name, True, True)
-    transform, start, prior, trend, points, _, scale, _, tuning = arguments
+    points, start, prior, trend, transform, _, scale, _, tuning = arguments
     q = np.array([0.1, -0.2, 0.15, 0.1, -0.3, 0.2, -0.4])
     p = start + transform @ q
     r = moved_residual(points, p, trend, SECTIONS[0]) / scale
     expected = loss(r, name, tuning).mean() + 0.5 * (prior[1] * (p - prior[0]) ** 2).sum() / len(points)
-    assert value_and_gradient(q, arguments)[0] == pytest.approx(expected, rel=1e-11)
+    found = value_and_gradient(q, objective.pack(*arguments))[0]
+    assert found == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_the_c_function_says_what_the_objective_says_with_and_without_a_gradient(name):
+    packed, q = objective.pack(*problem(4, name, True, True)), np.full(7, 0.05)
+    expected, gradient = value_and_gradient(q, packed)
+    written, call = np.zeros(7), objective.callback().ctypes
+    assert call(7, q.ctypes.data, written.ctypes.data, packed.ctypes.data) == pytest.approx(
+        expected, rel=1e-13
+    )
+    np.testing.assert_allclose(written, gradient, rtol=1e-12, atol=1e-14)
+    assert call(7, q.ctypes.data, 0, packed.ctypes.data) == pytest.approx(expected, rel=1e-13)
 
 
 def test_prepare_whitens_the_objective_where_it_stands():
     """Seen through the transform the mean Huber loss has unit curvature along every placement, h and w."""
     points, _ = straight_ridge(300, noise=0.1, seed=5, half=(4, 6))
     prior = np.zeros((2, 8))
-    start = np.array([0, 0, 0, 0, 0, 0, 3.0, 8.0])
-    scale, transform = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.1, prior[1])
-    arguments = (transform, start, prior, NO_TREND, points, bell().table, scale, LOSSES["huber"], 1.345)
+    huber = LOSSES["huber"], 1.345
+    _, _, packed = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.1, prior, *huber)
     step = 1e-2
     rows = [
-        (value_and_gradient(step * e, arguments)[1] - value_and_gradient(-step * e, arguments)[1])
-        / (2 * step)
+        (value_and_gradient(step * e, packed)[1] - value_and_gradient(-step * e, packed)[1]) / (2 * step)
         for e in np.eye(7)
     ]
     curvature = np.array(rows)
@@ -227,7 +238,7 @@ def test_explained_grows_with_what_the_ridge_explains():
 
 
 def test_sampled_points_lie_on_the_template():
-    points = appraise.sampled(3.0, 8.0, BEND, bell().table, 6.0, 7.0, 5, 9)
+    points = kernel.sampled(3.0, 8.0, BEND, bell().table, 6.0, 7.0, 5, 9)
     assert points.shape == (45, 3)
     np.testing.assert_allclose(np.unique(points[:, 0]), [-2.4, -1.2, 0.0, 1.2, 2.4], atol=1e-15)
     y = points[:, 1] - 0.5 * BEND[0] * points[:, 0] ** 2

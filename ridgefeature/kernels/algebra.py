@@ -87,10 +87,11 @@ def whitening(normal: Floats) -> Floats:
 
 @njit(cache=True)
 def moved(
-    position: Floats, rotation: Floats, start: Floats, transform: Floats, q: Floats
+    position: Floats, rotation: Floats, height: float, width: float, transform: Floats, q: Floats
 ) -> tuple[Floats, Floats, float, float]:
-    """Position (3,), rotation (3, 3), height and width at start + transform @ q, in the given frame."""
-    p = start.copy()
+    """Position (3,), rotation (3, 3), height and width, changed by transform @ q in their own frame."""
+    p = np.zeros(8)
+    p[6], p[7] = height, width
     for i in range(8):
         for j in range(q.size):
             p[i] += transform[i, j] * q[j]
@@ -130,14 +131,19 @@ def rotation_of(vector: Floats) -> tuple[Floats, Floats]:
         a = math.sin(angle) / angle
         b = (1.0 - math.cos(angle)) / square
         c = (1.0 - a) / square
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    square_skew = np.zeros((3, 3))
+    rotation, jacobian = np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            for k in range(3):
-                square_skew[i, j] += skew[i, k] * skew[k, j]
-    rotation = np.eye(3) + a * skew + b * square_skew
-    jacobian = np.eye(3) - b * skew + c * square_skew
+            # The square of the skew matrix is v v' - |v|^2 I.
+            outer = vector[i] * vector[j] - (square if i == j else 0.0)
+            one = 1.0 if i == j else 0.0
+            rotation[i, j] = one + b * outer
+            jacobian[i, j] = one + c * outer
+    for i, j, v in ((1, 0, z), (0, 2, y), (2, 1, x)):
+        rotation[i, j] += a * v
+        rotation[j, i] -= a * v
+        jacobian[i, j] -= b * v
+        jacobian[j, i] += b * v
     return rotation, jacobian
 
 

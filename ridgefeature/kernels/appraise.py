@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import solve_in_place, whitening
+from ridgefeature.kernels.objective import pack
 from ridgefeature.kernels.residual import (
     HUBER,
     INNER,
@@ -196,9 +197,15 @@ def prepare(
     trend: Floats,
     table: Floats,
     floor: float,
-    prior_weight: Floats,
-) -> tuple[float, Floats]:
-    """Robust scale of a template as it stands, and the whitening transform (8, 7) of its mean Huber loss."""
+    prior: Floats,
+    loss: int,
+    tuning: float,
+) -> tuple[float, Floats, Floats]:
+    """What an optimisation from a template as it stands needs.
+
+    The robust scale, not below floor; the whitening transform (8, 7) of the mean Huber loss; and the packed
+    problem of this loss (see kernels.objective). prior (2, 8): expected parameters, reciprocal variances.
+    """
     r, rows = _rows(points, height, width, trend, table)
     scale = max(1.4826 * np.median(np.abs(r)), floor)
     weights = np.empty(r.size)
@@ -207,8 +214,11 @@ def prepare(
     normal = np.zeros((8, 8))
     normal[1:, 1:] = _gram(rows, weights)
     for j in range(8):
-        normal[j, j] += prior_weight[j] / r.size
-    return scale, whitening(normal)
+        normal[j, j] += prior[1, j] / r.size
+    transform = whitening(normal)
+    start = np.zeros(8)
+    start[6], start[7] = height, width
+    return scale, transform, pack(points, start, prior, trend, transform, table, scale, loss, tuning)
 
 
 @njit(**OPTIONS)
@@ -270,31 +280,3 @@ def add_misfit(
         if k < bins.shape[1]:
             bins[0, k] += 1.0
             bins[1, k] += min(max(r[i] / scale, -2.0), 2.0)
-
-
-@njit(**OPTIONS)
-def sampled(
-    height: float,
-    width: float,
-    trend: Floats,
-    table: Floats,
-    length: float,
-    half_breadth: float,
-    along: int,
-    across: int,
-) -> Floats:
-    """Points (along * across, 3) at the middles of as many equal cells of a template, in its frame."""
-    spans = table.shape[0] - 2.0
-    out = np.empty((along * across, 3))
-    for i in range(along):
-        x = ((i + 0.5) / along - 0.5) * length
-        for j in range(across):
-            y = ((j + 0.5) / across * 2.0 - 1.0) * half_breadth
-            eta = y / max(width + trend[2] * x, 0.1 * width)
-            position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
-            span = np.int64(position)
-            t = position - span
-            g = table[span, 0] + t * (table[span, 1] + t * (table[span, 2] + t * table[span, 3]))
-            row = out[i * across + j]
-            row[0], row[1], row[2] = x, y + 0.5 * trend[0] * x * x, (height + trend[1] * x) * g
-    return out

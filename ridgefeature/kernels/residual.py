@@ -22,8 +22,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import rotation_of
-
 Floats = NDArray[np.float64]
 HUBER, TUKEY, SQUARE, CAUCHY = 0, 1, 2, 3
 
@@ -118,98 +116,29 @@ def weight_of(x: float, loss: int, tuning: float) -> float:
     return 1.0
 
 
-@njit(**INNER)
-def _sums(
-    points: Floats,
-    p: Floats,
-    rotation: Floats,
-    trend: Floats,
-    table: Floats,
-    scale: float,
-    loss: int,
-    tuning: float,
-) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """Sums of the loss and of psi times the residual's gradient: by x, y, z, turns, height and width."""
-    inverse_scale = 1.0 / scale
-    p0, p1, p2, height, width = p[0], p[1], p[2], p[6], p[7]
-    r00, r10, r20 = rotation[0, 0], rotation[1, 0], rotation[2, 0]
-    r01, r11, r21 = rotation[0, 1], rotation[1, 1], rotation[2, 1]
-    r02, r12, r22 = rotation[0, 2], rotation[1, 2], rotation[2, 2]
-    total = g_x = g_y = g_z = c_x = c_y = c_z = g_h = g_w = 0.0
-    column_x, column_y, column_z = columns(points)
-    bend, rise, widening = trend[0], trend[1], trend[2]
-    constant, linear, quadratic, cubic = split(table)
-    for i in range(column_x.size):
-        dx, dy, dz = column_x[i] - p0, column_y[i] - p1, column_z[i] - p2
-        x = r00 * dx + r10 * dy + r20 * dz
-        y = r01 * dx + r11 * dy + r21 * dz
-        z = r02 * dx + r12 * dy + r22 * dz
-        r, r_x, r_y, r_z, r_h, r_w = residual_jet(
-            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
-        )
-        rho, psi = loss_jet(r * inverse_scale, loss, tuning)
-        total += rho
-        a, b, c = psi * r_y, psi * r_z, psi * r_x
-        g_x += c
-        g_y += a
-        g_z += b
-        # A rotation phi of the body moves a point by u x phi, so the sum is of gradient x u.
-        c_x += a * z - b * y
-        c_y += b * x - c * z
-        c_z += c * y - a * x
-        g_h += psi * r_h
-        g_w += psi * r_w
-    return total, g_x, g_y, g_z, c_x, c_y, c_z, g_h, g_w
-
-
 @njit(**OPTIONS)
-def objective(
-    q: Floats,
-    gradient: Floats,
-    transform: Floats,
-    start: Floats,
-    prior: Floats,
+def sampled(
+    height: float,
+    width: float,
     trend: Floats,
-    points: Floats,
     table: Floats,
-    scale: float,
-    loss: int,
-    tuning: float,
-) -> float:
-    """Mean robust loss at parameters start + transform @ q; its gradient in q is written to `gradient`.
-
-    points (n, 3) in the start frame; start (8,); transform (8, m); q (m,). prior (2, 8): expected parameters
-    and their reciprocal variances; it counts once, whatever the number of points.
-    """
-    p = start.copy()
-    for i in range(8):
-        for j in range(q.size):
-            p[i] += transform[i, j] * q[j]
-    rotation, jacobian = rotation_of(p[3:6])
-    # One loop for each loss: a loop that asks which loss it is does not run in SIMD.
-    if loss == TUKEY:
-        sums = _sums(points, p, rotation, trend, table, scale, TUKEY, tuning)
-    elif loss == HUBER:
-        sums = _sums(points, p, rotation, trend, table, scale, HUBER, tuning)
-    elif loss == CAUCHY:
-        sums = _sums(points, p, rotation, trend, table, scale, CAUCHY, tuning)
-    else:
-        sums = _sums(points, p, rotation, trend, table, scale, SQUARE, tuning)
-    total, g_x, g_y, g_z, c_x, c_y, c_z, g_h, g_w = sums
-    if gradient.size > 0:
-        full = np.empty(8)
-        for i in range(3):
-            full[i] = -(rotation[i, 0] * g_x + rotation[i, 1] * g_y + rotation[i, 2] * g_z)
-            full[3 + i] = jacobian[0, i] * c_x + jacobian[1, i] * c_y + jacobian[2, i] * c_z
-        full[6], full[7] = g_h, g_w
-        for i in range(8):
-            full[i] += scale * prior[1, i] * (p[i] - prior[0, i])
-        norm = 1.0 / (scale * points.shape[0])
-        for j in range(q.size):
-            s = 0.0
-            for i in range(8):
-                s += transform[i, j] * full[i]
-            gradient[j] = s * norm
-    for i in range(8):
-        total += 0.5 * prior[1, i] * (p[i] - prior[0, i]) ** 2
-    return total / points.shape[0]
+    length: float,
+    half_breadth: float,
+    along: int,
+    across: int,
+) -> Floats:
+    """Points (along * across, 3) at the middles of as many equal cells of a template, in its frame."""
+    spans = table.shape[0] - 2.0
+    out = np.empty((along * across, 3))
+    for i in range(along):
+        x = ((i + 0.5) / along - 0.5) * length
+        for j in range(across):
+            y = ((j + 0.5) / across * 2.0 - 1.0) * half_breadth
+            eta = y / max(width + trend[2] * x, 0.1 * width)
+            position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
+            span = np.int64(position)
+            t = position - span
+            g = table[span, 0] + t * (table[span, 1] + t * (table[span, 2] + t * table[span, 3]))
+            row = out[i * across + j]
+            row[0], row[1], row[2] = x, y + 0.5 * trend[0] * x * x, (height + trend[1] * x) * g
+    return out

@@ -10,16 +10,17 @@ from .grid import LIMIT, Cells, Floats, Ints, before, cell_index
 def _sort_rows(rows: Floats, first: int, last: int) -> None:
     """Sort rows[first:last] by x, then y, then z, in place (Shell sort: short runs, no worst case of n^2)."""
     gap = 1
-    while gap < (last - first) // 3:
+    while gap < (last - first) // 8:
         gap = 3 * gap + 1
     while gap > 0:
         for i in range(first + gap, last):
-            x, y, z = rows[i, 0], rows[i, 1], rows[i, 2]
-            j = i - gap
-            while j >= first and (
-                rows[j, 0] > x
-                or (rows[j, 0] == x and (rows[j, 1] > y or (rows[j, 1] == y and rows[j, 2] > z)))
-            ):
+            x, j = rows[i, 0], i - gap
+            if rows[j, 0] < x:
+                continue
+            y, z = rows[i, 1], rows[i, 2]
+            while j >= first and rows[j, 0] >= x:
+                if rows[j, 0] == x and (rows[j, 1] < y or (rows[j, 1] == y and rows[j, 2] <= z)):
+                    break
                 rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = rows[j, 0], rows[j, 1], rows[j, 2]
                 j -= gap
             rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = x, y, z
@@ -90,6 +91,17 @@ def _clip_row(
     return _span(levels, frame, 0, origin[0] + low, origin[0] + high)
 
 
+@njit(cache=True, inline="always")
+def _scalars(origin: Floats, axes: Floats, half: Floats) -> tuple[float, ...]:
+    """The numbers of a box one by one: kept in registers, a loop over points takes half the time."""
+    return (
+        origin[0], origin[1], origin[2], half[0], half[1], half[2],
+        axes[0, 0], axes[0, 1], axes[0, 2],
+        axes[1, 0], axes[1, 1], axes[1, 2],
+        axes[2, 0], axes[2, 1], axes[2, 2],
+    )  # fmt: skip
+
+
 @njit(cache=True)
 def box_points(
     points: Floats, starts: Cells, levels: Ints, frame: Floats, origin: Floats, axes: Floats, half: Floats
@@ -110,18 +122,19 @@ def box_points(
             spans[i, 0], spans[i, 1] = row + x0, row + x1 + 1
             total += starts[row + x1 + 1] - starts[row + x0] if x1 >= x0 else 0
             i += 1
+    ox, oy, oz, hx, hy, hz, xx, xy, xz, yx, yy, yz, zx, zy, zz = _scalars(origin, axes, half)
     out = np.empty((total, 3))
     m = 0
     for i in range(rows):
         for c in range(spans[i, 0], spans[i, 1]):
             run = m
             for j in range(starts[c], starts[c + 1]):
-                dx, dy, dz = points[j, 0] - origin[0], points[j, 1] - origin[1], points[j, 2] - origin[2]
-                inside = True
-                for a in range(3):
-                    out[m, a] = dx * axes[a, 0] + dy * axes[a, 1] + dz * axes[a, 2]
-                    inside &= abs(out[m, a]) <= half[a]
-                m += inside
+                dx, dy, dz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
+                px = dx * xx + dy * xy + dz * xz
+                py = dx * yx + dy * yy + dz * yz
+                pz = dx * zx + dy * zy + dz * zz
+                out[m, 0], out[m, 1], out[m, 2] = px, py, pz
+                m += abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz
             _sort_rows(out, run, m)
     return out, m
 
@@ -147,6 +160,8 @@ def box_bins(
     kept = np.empty((nx * ny, 3))
     one = np.empty((1, 3))
     wide_x, wide_y = 2.0 * half[0] / nx, 2.0 * half[1] / ny
+    per_x, per_y = 1.0 / wide_x, 1.0 / wide_y
+    ox, oy, oz, hx, hy, hz, xx, xy, xz, yx, yy, yz, zx, zy, zz = _scalars(origin, axes, half)
     for z in range(first_z, last_z + 1):
         for y in range(first_y, last_y + 1):
             x0, x1 = _clip_row(levels, frame, origin, axes, half, reach, pad, y, z)
@@ -154,21 +169,21 @@ def box_bins(
             if x1 < x0:
                 continue
             for j in range(starts[row + x0], starts[row + x1 + 1]):
-                dx, dy, dz = points[j, 0] - origin[0], points[j, 1] - origin[1], points[j, 2] - origin[2]
-                inside = True
-                for a in range(3):
-                    one[0, a] = dx * axes[a, 0] + dy * axes[a, 1] + dz * axes[a, 2]
-                    inside &= abs(one[0, a]) <= half[a]
-                if not inside:
+                dx, dy, dz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
+                px = dx * xx + dy * xy + dz * xz
+                py = dx * yx + dy * yy + dz * yz
+                pz = dx * zx + dy * zy + dz * zz
+                if not (abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz):
                     continue
-                u = cell_index(one[0, 0], -half[0], 1.0 / wide_x, nx)
-                v = cell_index(one[0, 1], -half[1], 1.0 / wide_y, ny)
-                du = one[0, 0] + half[0] - (u + 0.5) * wide_x
-                dv = one[0, 1] + half[1] - (v + 0.5) * wide_y
+                u, v = min(int((px + hx) * per_x), nx - 1), min(int((py + hy) * per_y), ny - 1)
+                du, dv = px + hx - (u + 0.5) * wide_x, py + hy - (v + 0.5) * wide_y
                 d, b = du * du + dv * dv, v * nx + u
-                if d < best[b] or (d == best[b] and before(one, 0, kept, b)):
+                if d > best[b]:
+                    continue
+                one[0, 0], one[0, 1], one[0, 2] = px, py, pz
+                if d < best[b] or before(one, 0, kept, b):
                     best[b] = d
-                    kept[b] = one[0]
+                    kept[b, 0], kept[b, 1], kept[b, 2] = px, py, pz
     return kept[best < np.inf]
 
 
