@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import improve, sized
-from ridgefeature.kernels.appraise import explained
+from ridgefeature.kernels.evidence import explained
 from ridgefeature.kernels.search import best_straight_ridge
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels import appraise, residual
 from ridgefeature.kernels.algebra import moved
+from ridgefeature.kernels.evidence import assess
 from ridgefeature.kernels.fit import bounds, fit
 from ridgefeature.kernels.objective import objective
 from ridgefeature.optimise import c_functions, minimise, status_of
@@ -167,8 +169,8 @@ def sized(template: Template, settings: Settings) -> Template:
     length = settings.length * template.width
     if template.points and template.height:
         usual = template.points * length / template.length
-        width_error = 3.8 * template.scale / (abs(template.height) * np.sqrt(usual))
-        length *= float(np.clip((width_error / settings.wanted_error) ** 2, 1.0, settings.longest))
+        width_error = 3.8 * template.scale / (abs(template.height) * math.sqrt(usual))
+        length *= min(max((width_error / settings.wanted_error) ** 2, 1.0), settings.longest)
     return template.changed(length=length, flank=settings.flank * template.width)
 
 
@@ -254,17 +256,14 @@ def _noted(
     Misfit of a few per cent of the height is no evidence.
     """
     contrast = _LEAST_CONTRAST * abs(template.height)
-    scale, far, evidence = appraise.assess(
-        points, *template.shape, _floor(template), contrast, *loss_of(settings)
-    )
+    scale, far, evidence = assess(points, *template.shape, _floor(template), contrast, *loss_of(settings))
     noted = template.changed(
         scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence
     )
     return noted, far
 
 
-def judge(window: Window, template: Template, settings: Settings) -> Template:
-    """The template with standard deviations and counts as its window gives them."""
-    points = window(template)
+def judge(points: Array, template: Template, settings: Settings) -> Template:
+    """The template with standard deviations and counts as the points in its window (n, 3) give them."""
     std, inliers = appraise.deviations(points, *template.shape, template.scale, *loss_of(settings))
     return template.changed(std=std, points=len(points), inliers=int(inliers))

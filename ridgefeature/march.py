@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.kernels.algebra import cross, turned, walk
+from ridgefeature.kernels import chain as kernel
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -58,26 +58,10 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
     on, along the chord of the last two centres or along the last template's own direction, whatever the data
     then favour: a chord is known better, but lags at a kink.
     """
-    last = chain[-1]
+    last, near = chain[-1], chain[-3:]
     length = sized(last, settings).length
-    normal = sum((t.rotation[:, 2] for t in chain[-3:]), np.zeros(3))
-    normal /= math.sqrt(normal @ normal)
-    own = last.rotation[:, 0]
-    ways = [(own, 0.0)]
-    if len(chain) > 1:
-        chord = last.position - chain[-2].position
-        step = math.sqrt(chord @ chord)
-        if len(chain) > 2:
-            before = chain[-2].position - chain[-3].position
-            angle = math.atan2(normal @ cross(before, chord), before @ chord)
-            per_length = 2 * angle / (step + math.sqrt(before @ before))
-            ways = [
-                (turned(chord, normal, 0.5 * step * per_length), per_length),
-                (own, per_length),
-                (own, 0.0),
-            ]
-        else:
-            ways.append((chord, 0.0))
+    positions = np.array([t.position for t in near])
+    frames = np.array([t.rotation for t in near])
     start = last.changed(
         length=length,
         flank=settings.flank * last.width,
@@ -86,11 +70,8 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
         evidence=0.0,
         status="start",
     )
-    starts = []
-    for direction, per_length in ways:
-        position, frame = walk(last.end, normal, direction, per_length, 0.5 * last.length, 0.5 * length)
-        starts.append(start.changed(position=position, rotation=frame))
-    return starts
+    found = kernel.starts(positions, frames, last.length, length)
+    return [start.changed(position=place, rotation=axes) for place, axes in zip(*found, strict=True)]
 
 
 def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = False) -> str:

@@ -65,8 +65,10 @@ def register(
     spacing = _spacing(grid, pick)
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
     _check_pick(grid, pick, spacing, extent)
-    rough, full = Window(grid, spacing, _ROUGH_POINTS, margin=0.2), Window(grid, spacing)
-    track = _directed(_track(rough, full, pick, extent, hints, settings, progress), pick, hints)
+    full = Window(grid, spacing)
+    track = _directed(
+        _track(full.thinned(_ROUGH_POINTS), full, pick, extent, hints, settings, progress), pick, hints
+    )
     templates = _with_distances(track.templates, grid)
     return Ridge(
         **vars(lay_out(templates, settings)),

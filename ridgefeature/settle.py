@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, Limits, judge, limits_of, loss_of, refine
-from ridgefeature.kernels import appraise
+from ridgefeature.kernels import appraise, chain
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.march import GOES_ON, Track, reverse
 from ridgefeature.settings import Settings
@@ -21,51 +21,36 @@ _SAME_LENGTH = 0.15
 
 def trends(templates: list[Template]) -> list[Template]:
     """Each template with the path's curvature and the slopes of height and width that its neighbours show."""
-    n = len(templates)
-    if n < 2:
-        return [t.changed(trend=np.zeros(3)) for t in templates]
-    first, second = np.maximum(np.arange(n) - 1, 0), np.minimum(np.arange(n) + 1, n - 1)
-    frames = np.array([t.rotation for t in templates])
-    sizes = np.array([(t.height, t.width) for t in templates])
-    steps = np.diff(np.array([t.position for t in templates]), axis=0)
-    at = np.concatenate([[0.0], np.cumsum(np.sqrt((steps * steps).sum(axis=1)))])
-    gap = (at[second] - at[first])[:, None]
-    before, after, up = frames[first, :, 0], frames[second, :, 0], frames[:, :, 2]
-    turn = np.arctan2((up * np.cross(before, after)).sum(axis=1), (before * after).sum(axis=1))
-    limit = 0.9 / np.array([t.half_breadth for t in templates])
-    bend = np.clip(turn / gap[:, 0], -limit, limit)
-    rows = np.column_stack([bend, (sizes[second] - sizes[first]) / gap])
+    rows = chain.trends(
+        np.array([t.position for t in templates]),
+        np.array([t.rotation for t in templates]),
+        np.array([(t.height, t.width) for t in templates]),
+        np.array([t.half_breadth for t in templates]),
+    )
     return [t.changed(trend=row) for t, row in zip(templates, rows, strict=True)]
 
 
 def _change_point(window: Window, template: Template, reach: float, settings: Settings) -> float | None:
-    """Where along x, from the template's start to `reach`, the ridge stops explaining more than its base.
-
-    The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of
-    x (the maximum-likelihood change point). None if there are too few points.
-    """
+    """Where along x, from its start to `reach`, the ridge ends; None if there are too few points."""
     points = window(template, 1.0, 2 * reach / template.length)
     if len(points) < FEWEST_POINTS:
         return None
-    trend, table = template.trend.copy(), template.section.table
     # Far ahead the slopes are extrapolation: neither height nor width may more than halve.
-    trend[1] = np.clip(trend[1], -0.5 * abs(template.height) / reach, 0.5 * abs(template.height) / reach)
-    trend[2] = np.clip(trend[2], -0.5 * template.width / reach, 0.5 * template.width / reach)
-    ridge = appraise.residuals(points, template.height, template.width, trend, table)
-    base = appraise.residuals(points, 0.0, template.width, trend, table)
+    bend, rise, widening = template.trend
+    most, widest = 0.5 * abs(template.height) / reach, 0.5 * template.width / reach
+    trend = np.array([bend, min(max(rise, -most), most), min(max(widening, -widest), widest)])
     # Errors of the extrapolation must not count as noise.
     scale = max(template.scale, 0.1 * abs(template.height))
-    gain = appraise.losses(base / scale, *loss_of(settings)) - appraise.losses(
-        ridge / scale, *loss_of(settings)
+    end = chain.change_point(
+        points,
+        template.height,
+        template.width,
+        trend,
+        template.section.table,
+        scale,
+        *loss_of(settings),
     )
-    order = np.argsort(points[:, 0], kind="stable")
-    total = np.concatenate([[0.0], np.cumsum(gain[order])])
-    k = int(np.argmax(total))
-    if k == 0:
-        return -0.5 * template.length
-    x = points[order, 0]
-    last = x[k - 1]
-    return float(0.5 * (last + x[k])) if k < len(x) else float(last)
+    return max(float(end), -0.5 * template.length)
 
 
 def _trim_end(window: Window, templates: list[Template], settings: Settings) -> list[Template]:
@@ -140,16 +125,19 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     bins = np.zeros((2, _BINS))
     judged = []
     for i in range(len(known)):
-        new = _refit(window, known, i, settings)
-        appraise.add_misfit(bins, window(new), *new.shape, misfit_scale(new))
+        new, points = _refit(window, known, i, settings)
+        appraise.add_misfit(bins, points, *new.shape, misfit_scale(new))
         judged.append(new)
     return Track(tuple(judged), track.stop, bins)
 
 
-def _refit(window: Window, known: list[Template], i: int, settings: Settings) -> Template:
-    """The i-th template refitted and judged; as it was where the fit failed."""
+def _refit(window: Window, known: list[Template], i: int, settings: Settings) -> tuple[Template, Array]:
+    """The i-th template refitted and judged, as it was where the fit failed; and the points in its window."""
     new = refine(window, known[i], _expected(known, i, settings), settings)
-    return judge(window, known[i] if new.status in ("failed", "no data") else new, settings)
+    if new.status in ("failed", "no data"):
+        new = known[i]
+    points = window(new)
+    return judge(points, new, settings), points
 
 
 def misfit_scale(template: Template) -> float:
@@ -170,7 +158,7 @@ def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
     placed = list(place_ends(window, Track(tuple(templates), track.stop), settings).templates)
     for i, before in ((0, templates[0]), (-1, templates[-1])):
         if abs(placed[i].length / before.length - 1) > _SAME_LENGTH:
-            placed[i] = _refit(window, placed, i % len(placed), settings.marching())
+            placed[i], _ = _refit(window, placed, i % len(placed), settings.marching())
     return Track(tuple(placed), track.stop, track.misfit)
 
 

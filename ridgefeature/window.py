@@ -8,24 +8,58 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.grid import Grid, nearest_distances, points_in_ball, points_in_box
-from ridgefeature.kernels.algebra import select
+from ridgefeature.kernels.region import covering, select, thin
 from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
+_Box = tuple[Array, Array, float, float, float, float]
+_MARGIN = 0.2
+"""How much wider than asked a look-up is, in half breadths: windows may then turn and shift a little."""
+_LARGEST = 1.0 / 0.3
+"""How many times the breadth that is asked a region may have."""
+_MOST_REGIONS = 256
+
+
+def _bins(half: Array, most: int) -> tuple[int, int]:
+    """About half as many bins as `most`, nearly square, over a box of these half sizes."""
+    ratio = half[0] / half[1]
+    return max(round((0.5 * most * ratio) ** 0.5), 1), max(round((0.5 * most / ratio) ** 0.5), 1)
+
+
+@dataclass(eq=False)
+class _Regions:
+    """What was looked up: boxes, and the points in them in their own frames."""
+
+    boxes: Array = field(default_factory=lambda: np.empty((_MOST_REGIONS, 15)))
+    """(m, 15) each: origin (3,), axes as columns (3, 3) by rows, half sizes (3,)."""
+    points: list[Array] = field(default_factory=list)
+
+    def add(self, box: Array, points: Array) -> tuple[Array, Array]:
+        """The same box and points, held; the older half is dropped when there are too many."""
+        if len(self.points) == len(self.boxes):
+            dropped = len(self.boxes) // 2
+            self.boxes[:-dropped] = self.boxes[dropped:].copy()
+            del self.points[:dropped]
+        self.boxes[len(self.points)] = box
+        self.points.append(points)
+        return box, points
 
 
 @dataclass(eq=False)
 class Window:
-    """Points around a template, from the grid index; neighbouring requests share one look-up."""
+    """Points around a template, from the grid index; requests near one another share a look-up."""
 
     grid: Grid
     spacing: float
     most: int = 3000
-    """Windows that hold more are thinned to the points nearest to the centres of about half as many bins."""
-    margin: float = 0.15
-    """How much wider than asked a look-up is, in half breadths: windows may then turn and shift a little."""
-    _held: tuple[Array, Array, Array] | None = field(default=None, init=False)
-    _points: Array = field(default_factory=lambda: np.empty((0, 3)), init=False)
+    """Look-ups that hold more are thinned to the points nearest to the centres of about half as many bins."""
+    source: Window | None = None
+    """Window whose look-ups are thinned, instead of looking up."""
+    _regions: _Regions = field(default_factory=_Regions, init=False)
+
+    def thinned(self, most: int) -> Window:
+        """A window of fewer points, which shares this one's look-ups."""
+        return Window(self.grid, self.spacing, most, self)
 
     def __call__(self, template: Template, before: float = 1.0, after: float = 1.0) -> Array:
         """Points (m, 3) in the template's frame.
@@ -36,29 +70,34 @@ class Window:
         half_y = template.half_breadth
         half_z = 2.0 * abs(template.height) + 0.25 * template.width
         low, high = -0.5 * template.length * before, 0.5 * template.length * after
-        box = (template.position, template.rotation, low, high, half_y, half_z)
-        # What is held serves only while it is not far larger than what is asked.
-        if self._held is not None and 0.3 * self._held[2][1] < half_y:
-            found, covered = select(self._points, *self._held, *box)
-            if covered:
-                return found
-        centre = template.position + 0.5 * (low + high) * template.rotation[:, 0]
-        half = np.array([0.5 * (high - low), half_y, half_z])
-        half = (1.0 + 0.5 * self.margin) * half + self.margin * half_y
-        self._look_up(centre, template.rotation, half)
-        return select(self._points, centre, template.rotation, half, *box)[0]
+        window = (template.position, template.rotation, low, high, half_y, half_z)
+        box, points = self._region(window)
+        return select(points, box, *window)
 
-    def _look_up(self, centre: Array, rotation: Array, half: Array) -> None:
+    def _region(self, window: _Box) -> tuple[Array, Array]:
+        """Box and points of a region that covers the window."""
+        regions = self._regions
+        n = covering(regions.boxes, len(regions.points), *window, _LARGEST)
+        if n >= 0:
+            return regions.boxes[n], regions.points[n]
+        if self.source is None:
+            return regions.add(*self._look_up(*window))
+        box, points = self.source._region(window)
+        if len(points) > self.most:
+            points = thin(points, box[12], box[13], *_bins(box[12:], self.most))
+        return regions.add(box, points)
+
+    def _look_up(
+        self, position: Array, rotation: Array, low: float, high: float, half_y: float, half_z: float
+    ) -> tuple[Array, Array]:
+        """Box and points of a region that a window lies well inside of."""
+        centre = position + 0.5 * (low + high) * rotation[:, 0]
+        half = np.array([0.5 * (high - low), half_y, half_z])
+        half = (1.0 + 0.5 * _MARGIN) * half + _MARGIN * half_y
         expected = 4 * half[0] * half[1] * (0.5 / max(self.spacing, 1e-300)) ** 2
-        cells = None
-        if expected > self.most:
-            ratio = half[0] / half[1]
-            cells = (
-                max(round(np.sqrt(0.5 * self.most * ratio)), 1),
-                max(round(np.sqrt(0.5 * self.most / ratio)), 1),
-            )
-        self._points = points_in_box(self.grid, centre, rotation.T, half, cells, check=False)
-        self._held = (centre, rotation, half)
+        cells = _bins(half, self.most) if expected > self.most else None
+        points = points_in_box(self.grid, centre, rotation.T, half, cells, check=False)
+        return np.concatenate([centre, rotation.ravel(), half]), points
 
     def around(self, centre: Array, radius: float, frame: Array, most: int = 400) -> Array:
         """Points (m, 3) relative to centre within the radius, about `most` of them, spread evenly.

@@ -101,7 +101,7 @@ def test_a_fit_reports_status_evaluations_points_scale_and_evidence():
     assert 1 <= template.evaluations <= 4 * SETTINGS.max_evaluations
     assert template.scale == pytest.approx(0.1, rel=0.1)
     assert template.evidence > 1000
-    judged = judge(window, template, SETTINGS)
+    judged = judge(window(template), template, SETTINGS)
     assert 500 < judged.inliers <= judged.points == len(window(template))
     assert judged.std[0] == 0 and (judged.std[1:] > 0).all() and np.isfinite(judged.std).all()
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles import LOSSES, NO_TREND, jacobian, loss, moved_residual, psi, residual, straight_ridge
 from scipy.optimize import minimize
 
-from ridgefeature.kernels import appraise, objective
+from ridgefeature.kernels import appraise, evidence, objective
 from ridgefeature.kernels import residual as kernel
 from ridgefeature.kernels.search import best_straight_ridge
 from ridgefeature.section import bell, plateau
@@ -68,8 +68,8 @@ def test_the_robust_scale_is_the_scaled_median_and_never_below_its_floor():
     found = appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, prior, *huber)[0]
     assert found == pytest.approx(1.4826 * np.median(np.abs(r)), rel=1e-12)
     assert appraise.prepare(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, prior, *huber)[0] == 0.7
-    assert appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)[0] == found
-    assert appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, 0.5, *huber)[0] == 0.7
+    assert evidence.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)[0] == found
+    assert evidence.assess(points, 3.0, 8.0, NO_TREND, bell().table, 0.7, 0.5, *huber)[0] == 0.7
 
 
 def test_mean_loss_counts_the_share_beyond_three_scales():
@@ -189,7 +189,7 @@ def test_deviations_are_infinite_where_the_points_do_not_tell(points):
 
 def test_the_plane_of_least_squares_is_found_exactly():
     points = noisy()
-    best, plane = appraise.plane_loss(points, 0.1, LOSSES["square"], 1.0, 3)
+    best, plane = evidence.plane_loss(points, 0.1, LOSSES["square"], 1.0, 3)
     design = np.column_stack([np.ones(len(points)), points[:, :2]])
     expected, *_ = np.linalg.lstsq(design, points[:, 2], rcond=None)
     np.testing.assert_allclose(plane, expected, atol=1e-10)
@@ -210,7 +210,7 @@ def robust_plane(points: np.ndarray, scale: float, name: str, tuning: float) -> 
 
 def test_the_robust_plane_loss_is_the_smallest_there_is():
     points = noisy(200)
-    best, plane = appraise.plane_loss(points, 0.5, LOSSES["huber"], 1.345, 80)
+    best, plane = evidence.plane_loss(points, 0.5, LOSSES["huber"], 1.345, 80)
     assert best == pytest.approx(robust_plane(points, 0.5, "huber", 1.345), rel=1e-7)
     flat = points[:, 2] - plane[0] - points[:, :2] @ plane[1:]
     assert best == pytest.approx(loss(flat / 0.5, "huber", 1.345).sum(), rel=1e-12)
@@ -220,7 +220,7 @@ def test_the_robust_plane_loss_is_the_smallest_there_is():
 def test_evidence_is_twice_what_a_plane_loses_against_the_template(height, sign):
     points, _ = straight_ridge(300, height=height, noise=0.1, seed=4, half=(4, 6))
     huber = LOSSES["huber"], 1.345
-    _, far, found = appraise.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)
+    _, far, found = evidence.assess(points, 3.0, 8.0, NO_TREND, bell().table, 1e-9, 0.5, *huber)
     r = residual(points, 3.0, 8.0, NO_TREND, bell())
     assert far == pytest.approx(np.mean(np.abs(r) > 3 * 1.4826 * np.median(np.abs(r))))
     ridge = loss(residual(points, 3.0, 8.0, NO_TREND, bell()) / 0.5, "huber", 1.345).sum()
@@ -231,9 +231,9 @@ def test_evidence_is_twice_what_a_plane_loses_against_the_template(height, sign)
 
 def test_explained_grows_with_what_the_ridge_explains():
     points, _ = straight_ridge(300, noise=0.1, seed=4, half=(4, 6))
-    good = appraise.explained(points, 3.0, 8.0, NO_TREND, bell().table)
-    poor = appraise.explained(points, 2.0, 5.0, NO_TREND, bell().table)
-    wrong = appraise.explained(points, -3.0, 8.0, NO_TREND, bell().table)
+    good = evidence.explained(points, 3.0, 8.0, NO_TREND, bell().table)
+    poor = evidence.explained(points, 2.0, 5.0, NO_TREND, bell().table)
+    wrong = evidence.explained(points, -3.0, 8.0, NO_TREND, bell().table)
     assert good > 1 > poor > 0 > wrong
 
 

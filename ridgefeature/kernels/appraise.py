@@ -1,4 +1,4 @@
-"""How well a template as it stands agrees with its points: scale, whitening, evidence, deviations, misfit.
+"""How well a template as it stands agrees with its points: scale, whitening, deviations, misfit.
 
 Points are (n, 3) in the template's frame; `trend` and `table` are as in kernels.residual.
 """
@@ -17,6 +17,7 @@ from ridgefeature.kernels.residual import (
     HUBER,
     INNER,
     OPTIONS,
+    TUKEY,
     columns,
     loss_jet,
     residual_jet,
@@ -32,9 +33,10 @@ def residuals(points: Floats, height: float, width: float, trend: Floats, table:
     """Residuals (n,) of points (n, 3)."""
     bend, rise, widening = trend[0], trend[1], trend[2]
     constant, linear, quadratic, cubic = split(table)
-    out = np.empty(points.shape[0])
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    column_x, column_y, column_z = columns(points)
+    out = np.empty(column_x.size)
+    for i in range(column_x.size):
+        x, y, z = column_x[i], column_y[i], column_z[i]
         out[i] = residual_jet(
             x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
         )[0]
@@ -50,6 +52,32 @@ def losses(x: Floats, loss: int, tuning: float) -> Floats:
     return out
 
 
+@njit(**INNER)
+def loss_sum(r: Floats, scale: float, loss: int, tuning: float) -> float:
+    """Sum of the losses of residuals (n,)."""
+    inverse, total = 1.0 / scale, 0.0
+    # One loop for each loss, as in kernels.objective.
+    if loss == TUKEY:
+        for i in range(r.size):
+            total += loss_jet(r[i] * inverse, TUKEY, tuning)[0]
+    elif loss == HUBER:
+        for i in range(r.size):
+            total += loss_jet(r[i] * inverse, HUBER, tuning)[0]
+    else:
+        for i in range(r.size):
+            total += loss_jet(r[i] * inverse, loss, tuning)[0]
+    return total
+
+
+@njit(**INNER)
+def share_beyond(r: Floats, most: float) -> float:
+    """Share of residuals (n,) larger than `most`."""
+    far = 0.0
+    for i in range(r.size):
+        far += 1.0 if abs(r[i]) > most else 0.0
+    return far / r.size
+
+
 @njit(**OPTIONS)
 def mean_loss(
     points: Floats,
@@ -62,90 +90,8 @@ def mean_loss(
     tuning: float,
 ) -> tuple[float, float]:
     """Mean robust loss of a template as it stands, and the share of points beyond three scales."""
-    total, far = 0.0, 0
-    for r in residuals(points, height, width, trend, table):
-        total += loss_jet(r / scale, loss, tuning)[0]
-        far += abs(r / scale) > 3.0
-    return total / points.shape[0], far / points.shape[0]
-
-
-@njit(**OPTIONS)
-def plane_loss(
-    points: Floats, scale: float, loss: int, tuning: float, iterations: int
-) -> tuple[float, Floats]:
-    """Smallest robust loss of a plane z = a + b x + c y that reweighting finds, and its a, b, c (3,)."""
-    normal = np.zeros((3, 3))
-    right = np.zeros(3)
-    plane = np.zeros(3)
-    best, best_plane = np.inf, plane.copy()
-    for _ in range(iterations):
-        normal[:] = 0.0
-        right[:] = 0.0
-        total = 0.0
-        for i in range(points.shape[0]):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            r = z - plane[0] - plane[1] * x - plane[2] * y
-            weight = weight_of(r / scale, loss, tuning)
-            total += loss_jet(r / scale, loss, tuning)[0]
-            normal[0, 0] += weight
-            normal[1, 0] += weight * x
-            normal[2, 0] += weight * y
-            normal[1, 1] += weight * x * x
-            normal[2, 1] += weight * x * y
-            normal[2, 2] += weight * y * y
-            right[0] += weight * r
-            right[1] += weight * r * x
-            right[2] += weight * r * y
-        if total < best:
-            best, best_plane = total, plane.copy()
-        if not solve_in_place(normal, right):
-            break
-        plane += right
-    return best, best_plane
-
-
-@njit(**OPTIONS)
-def explained(points: Floats, height: float, width: float, trend: Floats, table: Floats) -> float:
-    """Log of the mean absolute residual of the best plane over the template's, both clipped at the height.
-
-    Unlike evidence it grows as the noise found shrinks, so it tells good fits of different windows apart.
-    """
-    most = abs(height)
-    plane = plane_loss(points, 0.3 * most, HUBER, 1.345, 5)[1]
-    ridge = residuals(points, height, width, trend, table)
-    flat = points[:, 2] - plane[0] - plane[1] * points[:, 0] - plane[2] * points[:, 1]
-    least = 1e-3 * most * points.shape[0]
-    return math.log(
-        (np.minimum(np.abs(flat), most).sum() + least) / (np.minimum(np.abs(ridge), most).sum() + least)
-    )
-
-
-@njit(**OPTIONS)
-def assess(
-    points: Floats,
-    height: float,
-    width: float,
-    trend: Floats,
-    table: Floats,
-    floor: float,
-    contrast: float,
-    loss: int,
-    tuning: float,
-) -> tuple[float, float, float]:
-    """Robust scale, not below floor; share of points beyond three scales; evidence.
-
-    The scale is the standard deviation that the median absolute residual tells. Evidence is twice the loss
-    that the best plane has more than the template, a log likelihood ratio, at a scale of at least `contrast`.
-    """
     r = residuals(points, height, width, trend, table)
-    scale = max(1.4826 * np.median(np.abs(r)), floor)
-    unit = max(scale, contrast)
-    far = 0
-    ridge = 0.0
-    for i in range(r.size):
-        far += abs(r[i]) > 3.0 * scale
-        ridge += loss_jet(r[i] / unit, loss, tuning)[0]
-    return scale, far / r.size, 2.0 * (plane_loss(points, unit, loss, tuning, 5)[0] - ridge)
+    return loss_sum(r, scale, loss, tuning) / r.size, share_beyond(r, 3.0 * scale)
 
 
 @njit(**INNER)

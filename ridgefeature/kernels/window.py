@@ -18,9 +18,10 @@ def _sort_rows(rows: Floats, first: int, last: int) -> None:
             if rows[j, 0] < x:
                 continue
             y, z = rows[i, 1], rows[i, 2]
-            while j >= first and rows[j, 0] >= x:
-                if rows[j, 0] == x and (rows[j, 1] < y or (rows[j, 1] == y and rows[j, 2] <= z)):
-                    break
+            while j >= first and (
+                rows[j, 0] > x
+                or (rows[j, 0] == x and (rows[j, 1] > y or (rows[j, 1] == y and rows[j, 2] > z)))
+            ):
                 rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = rows[j, 0], rows[j, 1], rows[j, 2]
                 j -= gap
             rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = x, y, z

@@ -1,0 +1,105 @@
+"""Kernels of a chain of templates: how it goes on, what its members tell of each other, where it ends."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.algebra import cross, turned, walk
+from ridgefeature.kernels.appraise import residuals
+from ridgefeature.kernels.residual import OPTIONS, loss_jet
+
+Floats = NDArray[np.float64]
+
+
+@njit(cache=True)
+def starts(positions: Floats, frames: Floats, last_length: float, length: float) -> tuple[Floats, Floats]:
+    """Positions (m, 3) and frames (m, 3, 3) of the patches of a length that may follow a chain.
+
+    positions (k, 3) and frames (k, 3, 3) of its last patches, 1 <= k <= 3, axes as columns. Each start begins
+    at the end of the last patch, on the mean base of the k. It goes on turning as the last three centres do,
+    or straight on, along the chord of the last two centres or along the last patch's own direction.
+    """
+    k = positions.shape[0]
+    normal = np.zeros(3)
+    for i in range(k):
+        normal += frames[i, :, 2]
+    normal /= math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    own = frames[k - 1, :, 0].copy()
+    joint = positions[k - 1] + 0.5 * last_length * own
+    ways, bends = np.empty((k, 3)), np.zeros(k)
+    ways[:] = own
+    if k == 2:
+        ways[1] = positions[1] - positions[0]
+    if k == 3:
+        chord, earlier = positions[2] - positions[1], positions[1] - positions[0]
+        step, step_before = math.sqrt((chord * chord).sum()), math.sqrt((earlier * earlier).sum())
+        turn = math.atan2((normal * cross(earlier, chord)).sum(), (earlier * chord).sum())
+        bends[0] = bends[1] = 2.0 * turn / (step + step_before)
+        ways[0] = turned(chord, normal, 0.5 * step * bends[0])
+    places, axes = np.empty((k, 3)), np.empty((k, 3, 3))
+    for i in range(k):
+        places[i], axes[i] = walk(joint, normal, ways[i], bends[i], 0.5 * last_length, 0.5 * length)
+    return places, axes
+
+
+@njit(cache=True)
+def trends(positions: Floats, frames: Floats, sizes: Floats, half_breadths: Floats) -> Floats:
+    """Curvature of the path, slopes of height and width (n, 3) at each patch, from its neighbours.
+
+    positions (n, 3), frames (n, 3, 3) axes as columns, sizes (n, 2) height and width. The curvature stays
+    below that at which the flank, half_breadths (n,) from the spine, would fold.
+    """
+    n = positions.shape[0]
+    out = np.zeros((n, 3))
+    if n < 2:
+        return out
+    at = np.zeros(n)
+    for i in range(1, n):
+        step = positions[i] - positions[i - 1]
+        at[i] = at[i - 1] + math.sqrt((step * step).sum())
+    for i in range(n):
+        a, b = max(i - 1, 0), min(i + 1, n - 1)
+        gap = at[b] - at[a]
+        before, after = frames[a, :, 0].copy(), frames[b, :, 0].copy()
+        turn = math.atan2((frames[i, :, 2] * cross(before, after)).sum(), (before * after).sum())
+        limit = 0.9 / half_breadths[i]
+        out[i, 0] = min(max(turn / gap, -limit), limit)
+        out[i, 1] = (sizes[b, 0] - sizes[a, 0]) / gap
+        out[i, 2] = (sizes[b, 1] - sizes[a, 1]) / gap
+    return out
+
+
+@njit(**OPTIONS)
+def change_point(
+    points: Floats,
+    height: float,
+    width: float,
+    trend: Floats,
+    table: Floats,
+    scale: float,
+    loss: int,
+    tuning: float,
+) -> float:
+    """Where along x a ridge that begins before the points (n, 3) stops explaining more than its base.
+
+    The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of
+    x: the maximum-likelihood change point. -inf where the ridge explains nothing.
+    """
+    ridge = residuals(points, height, width, trend, table)
+    base = residuals(points, 0.0, width, trend, table)
+    order = np.argsort(points[:, 0].copy(), kind="mergesort")
+    total = best = 0.0
+    last = -1
+    for k in range(order.size):
+        i = order[k]
+        total += loss_jet(base[i] / scale, loss, tuning)[0] - loss_jet(ridge[i] / scale, loss, tuning)[0]
+        if total > best:
+            best, last = total, k
+    if last < 0:
+        return -np.inf
+    x = points[order[last], 0]
+    return 0.5 * (x + points[order[last + 1], 0]) if last + 1 < order.size else x
