@@ -22,6 +22,9 @@ INTERRUPTED = "interrupted"
 _RAN_BACK = "it ran back into itself"
 GOES_ON = (INTERRUPTED, _RAN_BACK, "max_templates")
 """How the reasons of a march begin that stopped though the ridge goes on."""
+_FLAT = "no ridge: the data agree with a flat base"
+_WEAK = 5.0
+"""Evidence in parts of what is needed to go on, below which a ridge hardly stands out."""
 _ALIKE = math.cos(math.radians(8.0))
 _POOR_START = 0.5
 """Mean loss of a start, in noise scales, above which the other starts are looked at."""
@@ -50,7 +53,7 @@ def reverse(template: Template) -> Template:
     )
 
 
-def append(chain: list[Template], settings: Settings) -> list[Template]:
+def append(chain: list[Template], settings: Settings, longest: bool = False) -> list[Template]:
     """Starts of the next template, one for each way the ridge may go on.
 
     The first row lies on the last row of the last template of the chain; width and height are kept; the base
@@ -60,6 +63,8 @@ def append(chain: list[Template], settings: Settings) -> list[Template]:
     """
     last, near = chain[-1], chain[-3:]
     length = sized(last, settings).length
+    if longest:
+        length = settings.longest * settings.length * last.width
     positions = np.array([t.position for t in near])
     frames = np.array([t.rotation for t in near])
     start = last.changed(
@@ -79,7 +84,7 @@ def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = F
     if fitted.points < FEWEST_POINTS or fitted.status == "no data":
         return "the data end here"
     if fitted.evidence < settings.going_on:
-        return "no ridge: the data agree with a flat base"
+        return _FLAT
     if fitted.height * start.height <= 0 or abs(fitted.height) > 2.5 * abs(start.height):
         return "no ridge: the height jumped"
     if gap and (fitted.evidence < settings.evidence or not 0.5 < fitted.height / start.height < 2.0):
@@ -116,9 +121,20 @@ def _fit_next(
 
     The start that the data favour is fitted. Where that is rejected, or fits much worse than the template
     before, the other starts are tried, and last all points of the window instead of some; the best fit is
-    kept.
+    kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
-    starts = append(chain, settings)
+    start, fitted, why = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    if why.startswith(_FLAT) and chain[-1].evidence < _WEAK * settings.going_on:
+        longer = _fit_best(rough, full, chain, append(chain, settings, longest=True), gap, settings)
+        if not longer[2]:
+            return longer
+    return start, fitted, why
+
+
+def _fit_best(
+    rough: Window, full: Window, chain: list[Template], starts: list[Template], gap: bool, settings: Settings
+) -> tuple[Template, Template, str]:
+    """The start whose fit is best, this fit, and why it is none."""
     starts, alike = _unlike(starts)
     if len(starts) > 1 and start_loss(rough, starts[0], chain[-1].scale) > _POOR_START:
         starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))

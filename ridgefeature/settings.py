@@ -53,9 +53,10 @@ class Settings:
     march_height_change: float = _setting(
         2.0, "largest factor by which the height may rise from template to template"
     )
-    drift: float = _setting(
-        0.25, "relative change of the width between templates that is expected; of the height, twice"
+    march_drift: float = _setting(
+        0.15, "relative change of the width between templates that is expected; of the height, twice"
     )
+    drift: float = _setting(0.25, "the same for the first fit")
     width_change: float = _setting(2.0, "largest factor by which the first fit may change the width")
     height_change: float = _setting(4.0, "largest factor by which the first fit may raise the height")
     flips: bool = _setting(True, "let the first fit turn a ridge into a groove")
@@ -118,7 +119,11 @@ class Settings:
     def marching(self) -> Settings:
         """The settings for a template whose neighbour is known."""
         return replace(
-            self, width_change=self.march_width_change, height_change=self.march_height_change, flips=False
+            self,
+            width_change=self.march_width_change,
+            height_change=self.march_height_change,
+            drift=self.march_drift,
+            flips=False,
         )
 
 

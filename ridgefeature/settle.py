@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 _BINS = 16
 _SAME_LENGTH = 0.15
+_BEFORE_END = 4
+"""Templates before the last one that tell what to expect of it."""
 
 
 def trends(templates: list[Template]) -> list[Template]:
@@ -35,9 +37,9 @@ def _change_point(window: Window, template: Template, reach: float, settings: Se
     points = window(template, 1.0, 2 * reach / template.length)
     if len(points) < FEWEST_POINTS:
         return None
-    # Far ahead the slopes are extrapolation: neither height nor width may more than halve.
+    # Far ahead the slopes are extrapolation: neither height nor width may change by more than a third.
     bend, rise, widening = template.trend
-    most, widest = 0.5 * abs(template.height) / reach, 0.5 * template.width / reach
+    most, widest = 0.3 * abs(template.height) / reach, 0.3 * template.width / reach
     trend = np.array([bend, min(max(rise, -most), most), min(max(widening, -widest), widest)])
     # Errors of the extrapolation must not count as noise.
     scale = max(template.scale, 0.1 * abs(template.height))
@@ -69,19 +71,33 @@ def _trim_end(window: Window, templates: list[Template], settings: Settings) -> 
 
 
 def _as_expected(templates: list[Template]) -> Template:
-    """The last template with the height its neighbour lets expect, if that is more.
+    """The last template with the height and width that those before it let expect, where these are more.
 
-    A template half beyond the end is fitted too low, and a low ridge looks as if it went on for ever.
+    A template that lies half beyond the end is fitted too low or too narrow, and too steep: such a ridge
+    looks as if it went on for ever.
     """
-    last = templates[-1]
-    if len(templates) == 1:
+    last, inner = templates[-1], templates[-1 - _BEFORE_END : -1]
+    if not inner:
         return last
-    inner = templates[-2]
-    step = float(np.linalg.norm(last.position - inner.position))
-    expected = inner.height + np.clip(
-        inner.trend[1] * step, -0.3 * abs(inner.height), 0.3 * abs(inner.height)
-    )
-    return last.changed(height=float(expected)) if abs(expected) > abs(last.height) else last
+    places = np.array([t.position for t in templates[-1 - len(inner) :]])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    sizes = np.array([(t.height, t.width) for t in inner])
+    (height, width), slopes = _extrapolated(-np.cumsum(steps[::-1])[::-1], sizes)
+    height = height if abs(height) > abs(last.height) else last.height
+    trend = np.array([last.trend[0], *slopes])
+    return last.changed(height=float(height), width=float(max(width, last.width)), trend=trend)
+
+
+def _extrapolated(at: Array, sizes: Array) -> tuple[Array, Array]:
+    """Heights and widths (n, 2) at distances (n,) before 0, continued by a straight line to 0; its slopes.
+
+    They change by less than a third of the last ones.
+    """
+    ahead = at - at.mean()
+    square = ahead @ ahead
+    slopes = ahead @ sizes / square if square > 0 else np.zeros(2)
+    change = sizes.mean(axis=0) - slopes * at.mean() - sizes[-1]
+    return sizes[-1] + np.clip(change, -0.3 * abs(sizes[-1]), 0.3 * abs(sizes[-1])), slopes
 
 
 def _relength(template: Template, low: float, high: float) -> Template:

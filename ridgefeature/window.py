@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 _Box = tuple[Array, Array, float, float, float, float]
 _MARGIN = 0.2
 """How much wider than asked a look-up is, in half breadths: windows may then turn and shift a little."""
-_LARGEST = 1.0 / 0.3
-"""How many times the breadth that is asked a region may have."""
+_LARGEST = 3.0
+"""How many times the area that is asked a region may have."""
 _MOST_REGIONS = 256
 
 

@@ -47,7 +47,7 @@ def test_a_region_serves_exactly_the_windows_that_lie_in_it(seed):
     expected, covers = brute_force(points, old, *[new], low, high, half_y, half_z)
     far = box_of(old[0] + 100, old[1])
     boxes = np.array([far, box_of(*old), far, box_of(*old)])
-    assert region.covering(boxes, 3, *window, 100.0) == (1 if covers else -1)
+    assert region.covering(boxes, 3, *window, 1e9) == (1 if covers else -1)
     found = region.select(points, box_of(*old), *window)
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
@@ -55,10 +55,16 @@ def test_a_region_serves_exactly_the_windows_that_lie_in_it(seed):
 def test_the_newest_region_serves_and_a_far_larger_one_does_not():
     axes, origin = np.eye(3), np.zeros(3)
     boxes = np.array([box_of(origin, axes), box_of(origin, axes)])
-    window = (origin, axes, -0.5, 0.5, 1.0, 0.5)
-    assert region.covering(boxes, 2, *window, 10.0) == 1
-    assert region.covering(boxes, 2, *window, 4.9) == -1
-    assert region.covering(boxes, 0, *window, 10.0) == -1
+    window = (origin, axes, -1.0, 1.0, 1.0, 0.5)
+    assert region.covering(boxes, 2, *window, 31.0) == 1
+    assert region.covering(boxes, 2, *window, 29.0) == -1
+    assert region.covering(boxes, 0, *window, 31.0) == -1
+
+
+def test_a_thinned_window_is_as_dense_whatever_was_looked_up_before(window):
+    few, wide = window.thinned(100), patch(0.0, width=14.0)
+    few(wide)
+    assert len(few(patch(0.0, width=2.0))) >= 20
 
 
 @given(st.integers(0, 10**6))

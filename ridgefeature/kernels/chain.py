@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import cross, turned, walk
 from ridgefeature.kernels.appraise import residuals
+from ridgefeature.kernels.evidence import plane_loss
 from ridgefeature.kernels.residual import OPTIONS, loss_jet
 
 Floats = NDArray[np.float64]
+_FEWEST_OUTSIDE = 12
 
 
 @njit(cache=True)
@@ -74,6 +76,24 @@ def trends(positions: Floats, frames: Floats, sizes: Floats, half_breadths: Floa
 
 
 @njit(**OPTIONS)
+def _levelled(points: Floats, width: float, trend: Floats, scale: float, loss: int, tuning: float) -> Floats:
+    """The points (n, 3) with the robust plane through those outside the feet taken off."""
+    n, m = points.shape[0], 0
+    outside = np.empty((n, 3))
+    for i in range(n):
+        x, y = points[i, 0], points[i, 1]
+        if abs(y - 0.5 * trend[0] * x * x) > 0.5 * max(width + trend[2] * x, 0.1 * width):
+            outside[m] = points[i]
+            m += 1
+    out = points.copy()
+    if m >= _FEWEST_OUTSIDE:
+        _, plane = plane_loss(outside[:m], scale, loss, tuning, 5)
+        for i in range(n):
+            out[i, 2] -= plane[0] + plane[1] * points[i, 0] + plane[2] * points[i, 1]
+    return out
+
+
+@njit(**OPTIONS)
 def change_point(
     points: Floats,
     height: float,
@@ -87,8 +107,10 @@ def change_point(
     """Where along x a ridge that begins before the points (n, 3) stops explaining more than its base.
 
     The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of
-    x: the maximum-likelihood change point. -inf where the ridge explains nothing.
+    x: the maximum-likelihood change point. -inf where the ridge explains nothing. The base is levelled by the
+    points outside the feet first: far ahead a small error of its tilt would look like a ridge.
     """
+    points = _levelled(points, width, trend, scale, loss, tuning)
     ridge = residuals(points, height, width, trend, table)
     base = residuals(points, 0.0, width, trend, table)
     order = np.argsort(points[:, 0].copy(), kind="mergesort")

@@ -38,15 +38,15 @@ def covering(
     """Number of the last of the first `count` boxes that covers a window, -1 if none does.
 
     boxes (m, 15): origin (3,), axes as columns (3, 3) by rows, half sizes (3,). The window runs from low to
-    high in x of its own frame and lies within half_y and half_z in y and z. A box more than `largest` times
-    as wide does not serve: going through its points would take longer than looking them up.
+    high in x of its own frame and lies within half_y and half_z in y and z. A box over more than `largest`
+    times the area does not serve: its points may be thinned too far.
     """
     middle, half_x = 0.5 * (low + high), 0.5 * (high - low)
     for n in range(count - 1, -1, -1):
         box = boxes[n]
         reach = box[12] + box[13] + box[14]
         apart = abs(position[0] - box[0]) + abs(position[1] - box[1]) + abs(position[2] - box[2])
-        if apart > 2.0 * reach or box[13] > largest * half_y:
+        if apart > 2.0 * reach or box[12] * box[13] > largest * half_x * half_y:
             continue
         shift, turn = _relative(box, position, rotation)
         covered = True
