@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import improve, sized
+from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
-from ridgefeature.kernels.search import best_straight_ridge
+from ridgefeature.kernels.search import best_straight_ridge, principal_axes
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -40,36 +42,34 @@ class Hints:
     kind: str = "ridge"
 
 
-def _frame(points: Array) -> Array:
-    """Columns: principal axes of points (n, 3), the normal last; right-handed."""
-    centred = points - points.mean(axis=0)
-    _, axes = np.linalg.eigh(centred.T @ centred)
-    frame = axes[:, ::-1].copy()
-    frame[:, 2] *= np.sign(np.linalg.det(frame))
-    return frame
+@dataclass(frozen=True)
+class _Start:
+    """A straight ridge of one width, in a frame (columns) about the pick, and how much it explains.
+
+    found (7,) is that of kernels.search.best_straight_ridge.
+    """
+
+    score: float
+    width: float
+    frame: Array
+    found: Array
 
 
-def _orient(direction: Array, normal: Array) -> Array:
-    """Rotation whose x follows direction (projected) and whose z is the normal."""
-    x = direction - normal * (direction @ normal)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(normal, x), normal])
-
-
-def _start(
-    points: Array, frame: Array, width: float, pick: Array, hints: Hints, section: Section, settings: Settings
-) -> tuple[float, Template] | None:
-    """The best straight ridge of one width through points (n, 3) about the pick, with its score."""
-    local = points @ frame
+def _start(points: Array, frame: Array, width: float, hints: Hints, section: Section) -> _Start | None:
+    """The best straight ridge of one width through points (n, 3) about the pick; None if there is none."""
     angles = _ANGLES
     if hints.direction is not None:
         d = hints.direction @ frame
         angles = np.arctan2(d[1], d[0]) + np.radians([-10.0, 0.0, 10.0])
-    explained, angle, offset, height, a, b, c = best_straight_ridge(
-        local, width, angles, _OFFSETS, section.table
-    )
-    if explained <= 0:
+    found = best_straight_ridge(points @ frame, width, angles, _OFFSETS, section.table)
+    if found[0] <= 0:
         return None
+    return _Start(len(points) * -math.log(max(1.0 - found[0], 1e-6)), width, frame, found)
+
+
+def _template(start: _Start, pick: Array, hints: Hints, section: Section, settings: Settings) -> Template:
+    frame, width = start.frame, start.width
+    _, angle, offset, height, a, b, c = start.found
     normal = frame @ (np.array([-b, -c, 1.0]) / np.sqrt(1 + b * b + c * c))
     if (height < 0) != (hints.kind == "groove"):
         normal, height = -normal, -height
@@ -78,38 +78,35 @@ def _start(
     position = pick + frame @ np.array([foot[0], foot[1], a + b * foot[0] + c * foot[1]])
     if hints.height is not None:
         height = np.copysign(hints.height, height)
-    template = Template(
+    return Template(
         position,
-        _orient(along, normal),
+        facing(normal, along),
         width,
         float(height),
         settings.length * width,
         settings.flank * width,
         section,
     )
-    return len(points) * -np.log(max(1 - explained, 1e-6)), template
 
 
-def _starts(
-    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
-) -> list[tuple[float, Template]]:
-    """Starting templates with their scores, one for each width of a geometric ladder, the best first."""
+def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: Section) -> list[_Start]:
+    """Straight ridges of the widths of a geometric ladder, the best first."""
     radius, last = 3.0 * window.spacing, extent / 2.7
     if hints.width is not None:
         radius = last = 1.1 * hints.width
-    starts: list[tuple[float, Template]] = []
+    starts: list[_Start] = []
     frame, falling = np.eye(3), 0
     while radius <= last * (1 + 1e-9) and falling < _PAST_BEST:
         points = window.around(pick, radius, frame)
         if len(points) >= _FEWEST:
-            frame = _frame(points)
-            start = _start(points, frame, radius / 1.1, pick, hints, section, settings)
+            frame = principal_axes(points)
+            start = _start(points, frame, radius / 1.1, hints, section)
             if start is not None:
-                most = max((score for score, _ in starts), default=0.0)
-                falling = falling + 1 if most > _CLEAR and start[0] < 0.4 * most else 0
+                most = max((s.score for s in starts), default=0.0)
+                falling = falling + 1 if most > _CLEAR and start.score < 0.4 * most else 0
                 starts.append(start)
         radius *= _LADDER
-    return sorted(starts, key=lambda pair: -pair[0])
+    return sorted(starts, key=lambda start: -start.score)
 
 
 def guess(
@@ -123,10 +120,10 @@ def guess(
     to try.
     """
     best: tuple[float, Template] | None = None
-    for tried, (_, start) in enumerate(_starts(window, pick, extent, hints, section, settings)):
+    for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
         if tried >= _FEWEST_TRIES and best is not None and best[0] > _CLEAR:
             break
-        fitted = improve(window, start, settings)
+        fitted = improve(window, _template(start, pick, hints, section, settings), settings)
         score = _score(window, fitted, pick)
         if best is None or score > best[0]:
             best = score, fitted

@@ -56,6 +56,7 @@ class Window:
     source: Window | None = None
     """Window whose look-ups are thinned, instead of looking up."""
     _regions: _Regions = field(default_factory=_Regions, init=False)
+    _last: tuple[_Box | None, Array] = field(default=(None, np.empty((0, 3))), init=False)
 
     def thinned(self, most: int) -> Window:
         """A window of fewer points, which shares this one's look-ups."""
@@ -71,8 +72,12 @@ class Window:
         half_z = 2.0 * abs(template.height) + 0.25 * template.width
         low, high = -0.5 * template.length * before, 0.5 * template.length * after
         window = (template.position, template.rotation, low, high, half_y, half_z)
-        box, points = self._region(window)
-        return select(points, box, *window)
+        last, found = self._last
+        if last is None or last[0] is not window[0] or last[1] is not window[1] or last[2:] != window[2:]:
+            box, points = self._region(window)
+            found = select(points, box, *window)
+            self._last = window, found
+        return found
 
     def _region(self, window: _Box) -> tuple[Array, Array]:
         """Box and points of a region that covers the window."""

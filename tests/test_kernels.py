@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from ridgefeature.kernels import appraise, evidence, objective
 from ridgefeature.kernels import residual as kernel
-from ridgefeature.kernels.search import best_straight_ridge
+from ridgefeature.kernels.search import best_straight_ridge, principal_axes
 from ridgefeature.section import bell, plateau
 
 BEND = np.array([0.03, 0.05, -0.04])
@@ -284,3 +284,23 @@ def test_the_best_straight_ridge_is_that_of_brute_force(section, height):
 def test_points_that_leave_nothing_to_explain_give_no_ridge(points):
     found = best_straight_ridge(points, 6.0, np.arange(3.0), np.zeros(1), bell().table)
     assert found[0] <= 1.0 and np.isfinite(found).all()
+
+
+@given(st.integers(0, 10**6), st.sampled_from([1e-6, 1.0, 1e6]))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_principal_axes_are_the_eigenvectors_of_the_scatter(seed, size):
+    random = np.random.default_rng(seed)
+    points = size * random.normal(size=(30, 3)) @ random.normal(size=(3, 3)) + 1e3 * size
+    axes = principal_axes(points)
+    centred = points - points.mean(axis=0)
+    scatter = axes.T @ (centred.T @ centred) @ axes
+    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert abs(scatter - np.diag(np.diag(scatter))).max() <= 1e-9 * scatter.max()
+    assert scatter[0, 0] >= scatter[1, 1] >= scatter[2, 2]
+
+
+def test_principal_axes_of_a_plane_end_with_its_normal():
+    x, y = np.meshgrid(np.arange(5.0), np.arange(3.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    np.testing.assert_allclose(np.abs(principal_axes(points)), np.eye(3), atol=1e-15)

@@ -8,9 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import solve_in_place
+from ridgefeature.kernels.algebra import cross, solve_in_place
 
 Floats = NDArray[np.float64]
+_SWEEPS = 12
 
 
 @njit(cache=True, inline="always")
@@ -109,3 +110,38 @@ def best_straight_ridge(
                 best[0], best[1], best[2], best[3] = explained, angle, offset, height
                 best[4:] = plane - height * follows
     return best
+
+
+@njit(cache=True)
+def principal_axes(points: Floats) -> Floats:
+    """Columns (3, 3): principal axes of points (n, 3) by falling extent, right-handed (Jacobi's method)."""
+    n = points.shape[0]
+    mean = np.zeros(3)
+    for i in range(n):
+        for j in range(3):
+            mean[j] += points[i, j] / n
+    a, axes = np.zeros((3, 3)), np.eye(3)
+    for i in range(n):
+        for j in range(3):
+            for k in range(3):
+                a[j, k] += (points[i, j] - mean[j]) * (points[i, k] - mean[k])
+    for _ in range(_SWEEPS):
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            if abs(a[p, q]) <= 1e-300 + 1e-18 * (abs(a[p, p]) + abs(a[q, q])):
+                continue
+            theta = 0.5 * (a[q, q] - a[p, p]) / a[p, q]
+            t = math.copysign(1.0, theta) / (abs(theta) + math.hypot(theta, 1.0))
+            c = 1.0 / math.hypot(t, 1.0)
+            s = t * c
+            for k in range(3):
+                a[k, p], a[k, q] = c * a[k, p] - s * a[k, q], s * a[k, p] + c * a[k, q]
+            for k in range(3):
+                a[p, k], a[q, k] = c * a[p, k] - s * a[q, k], s * a[p, k] + c * a[q, k]
+            for k in range(3):
+                axes[k, p], axes[k, q] = c * axes[k, p] - s * axes[k, q], s * axes[k, p] + c * axes[k, q]
+    order = np.argsort(np.array([-a[0, 0], -a[1, 1], -a[2, 2]]))
+    out = np.empty((3, 3))
+    for j in range(2):
+        out[:, j] = axes[:, order[j]]
+    out[:, 2] = cross(out[:, 0], out[:, 1])
+    return out
