@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.distance import sampling_floor
+from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
@@ -17,7 +18,7 @@ from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
-from ridgefeature.settle import finish_ends, place_ends, settle
+from ridgefeature.settle import finish_ends, settle
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.window import Window

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix
 from ridgefeature.bspline import Curve
+from ridgefeature.kernels.natural_spline import natural_spline_matrix
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 
@@ -41,44 +42,6 @@ class Stations:
     """(k,) distance of the flanks' outer borders from the spine; a change of h or w does not move them."""
 
 
-def natural_spline_matrix(sites: Array, at: Array) -> Array:
-    """Linear map (m, n) from values at sites (n,), ascending, to the natural cubic spline at `at` (m,).
-
-    Beyond the sites the spline goes on straight. One site: constant. (de Boor, A Practical Guide to Splines,
-    ch. 4.)
-    """
-    n = len(sites)
-    if n == 1:
-        return np.ones((len(at), 1))
-    step = np.diff(sites)
-    second = np.zeros((n, n))
-    if n > 2:
-        system = (
-            np.diag((step[:-1] + step[1:]) / 3) + np.diag(step[1:-1] / 6, 1) + np.diag(step[1:-1] / 6, -1)
-        )
-        rows = np.arange(n - 2)
-        right = np.zeros((n - 2, n))
-        right[rows, rows] = 1 / step[:-1]
-        right[rows, rows + 1] = -1 / step[:-1] - 1 / step[1:]
-        right[rows, rows + 2] = 1 / step[1:]
-        second[1:-1] = np.linalg.solve(system, right)
-    held = np.clip(at, sites[0], sites[-1])
-    i = np.clip(np.searchsorted(sites, held, side="right") - 1, 0, n - 2)
-    h, row = step[i], np.arange(len(at))
-    b = (held - sites[i]) / h
-    a = 1 - b
-    out = ((a**3 - a) * h**2 / 6)[:, None] * second[i] + ((b**3 - b) * h**2 / 6)[:, None] * second[i + 1]
-    out[row, i] += a
-    out[row, i + 1] += b
-    for end, inner, sign in ((0, 1, -1.0), (n - 1, n - 2, 1.0)):
-        slope = sign * abs(sites[end] - sites[inner]) / 6 * second[inner]
-        slope[end] += sign / abs(sites[end] - sites[inner])
-        slope[inner] -= sign / abs(sites[end] - sites[inner])
-        beyond = (at < sites[0]) if end == 0 else (at > sites[-1])
-        out[beyond] += (at[beyond] - sites[end])[:, None] * slope
-    return out
-
-
 def interpolating_curve(sites: Array, points: Array) -> Curve:
     """Cubic spline (n, d) through points at sites (n,), not-a-knot; of lower degree below four points."""
     n = len(sites)
@@ -89,7 +52,7 @@ def interpolating_curve(sites: Array, points: Array) -> Curve:
     return Curve(poles, knots, degree)
 
 
-def _arc_lengths(path: Curve, sites: Array, per_site: int = 64) -> tuple[Array, Array]:
+def _arc_lengths(path: Curve, sites: Array, per_site: int = 32) -> tuple[Array, Array]:
     """Parameters, dense between the sites, and the arc length of the curve up to each (Simpson's rule)."""
     fine = np.interp(np.arange(per_site * (len(sites) - 1) + 1) / per_site, np.arange(len(sites)), sites)
     speed = np.linalg.norm(path(fine, 1), axis=1)

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from ridgefeature import Settings
 from ridgefeature.bspline import Surface
+from ridgefeature.kernels.natural_spline import natural_spline_matrix
 from ridgefeature.merge import along, merged_surface, template_surface
 from ridgefeature.section import plateau
-from ridgefeature.stations import Stations, interpolating_curve, lay_out, natural_spline_matrix
+from ridgefeature.stations import Stations, interpolating_curve, lay_out
 
 TURN = Rotation.from_rotvec([0.3, -0.8, 1.7]).as_matrix()
 

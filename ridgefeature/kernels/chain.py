@@ -15,6 +15,8 @@ from ridgefeature.kernels.residual import OPTIONS, loss_jet
 
 Floats = NDArray[np.float64]
 _FEWEST_OUTSIDE = 12
+_BEYOND_DOUBT = 10.0
+"""Log likelihood ratio that a ridge never loses by chance."""
 
 
 @njit(cache=True)
@@ -52,6 +54,7 @@ def starts(positions: Floats, frames: Floats, last_length: float, length: float)
 def trends(positions: Floats, frames: Floats, sizes: Floats, half_breadths: Floats) -> Floats:
     """Curvature of the path, slopes of height and width (n, 3) at each patch, from its neighbours.
 
+    Those of the ends are what the last three patches tell: two alone tell little.
     positions (n, 3), frames (n, 3, 3) axes as columns, sizes (n, 2) height and width. The curvature stays
     below that at which the flank, half_breadths (n,) from the spine, would fold.
     """
@@ -64,7 +67,7 @@ def trends(positions: Floats, frames: Floats, sizes: Floats, half_breadths: Floa
         step = positions[i] - positions[i - 1]
         at[i] = at[i - 1] + math.sqrt((step * step).sum())
     for i in range(n):
-        a, b = max(i - 1, 0), min(i + 1, n - 1)
+        a, b = max(min(i - 1, n - 3), 0), min(max(i + 1, 2), n - 1)
         gap = at[b] - at[a]
         before, after = frames[a, :, 0].copy(), frames[b, :, 0].copy()
         turn = math.atan2((frames[i, :, 2] * cross(before, after)).sum(), (before * after).sum())
@@ -107,7 +110,8 @@ def change_point(
     """Where along x a ridge that begins before the points (n, 3) stops explaining more than its base.
 
     The largest partial sum of the log likelihood ratio of ridge against base, point by point in the order of
-    x: the maximum-likelihood change point. -inf where the ridge explains nothing. The base is levelled by the
+    x: the maximum-likelihood change point. Once the sum has fallen far below it nothing further on counts: it
+    is another ridge (Page 1954, CUSUM). -inf where the ridge explains nothing. The base is levelled by the
     points outside the feet first: far ahead a small error of its tilt would look like a ridge.
     """
     points = _levelled(points, width, trend, scale, loss, tuning)
@@ -121,6 +125,8 @@ def change_point(
         total += loss_jet(base[i] / scale, loss, tuning)[0] - loss_jet(ridge[i] / scale, loss, tuning)[0]
         if total > best:
             best, last = total, k
+        elif total < best - _BEYOND_DOUBT:
+            break
     if last < 0:
         return -np.inf
     x = points[order[last], 0]

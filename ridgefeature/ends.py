@@ -1,0 +1,137 @@
+"""Where a ridge ends: the change point of its last template, as the templates before it let expect it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.improve import FEWEST_POINTS, loss_of
+from ridgefeature.kernels import chain
+from ridgefeature.kernels.algebra import rotation_of
+from ridgefeature.march import GOES_ON, Track, reverse
+from ridgefeature.settings import Settings
+from ridgefeature.template import Template
+from ridgefeature.window import Window
+
+Array = NDArray[np.float64]
+_BEFORE_END = 4
+"""Templates before the last one that tell what to expect of it."""
+_BEYOND_CHANCE = 2.0
+"""Evidence, in parts of what is needed to go on, above which a template lies on the ridge beyond doubt."""
+
+
+def trends(templates: list[Template]) -> list[Template]:
+    """Each template with the path's curvature and the slopes of height and width that its neighbours show."""
+    rows = chain.trends(
+        np.array([t.position for t in templates]),
+        np.array([t.rotation for t in templates]),
+        np.array([(t.height, t.width) for t in templates]),
+        np.array([t.half_breadth for t in templates]),
+    )
+    return [t.changed(trend=row) for t, row in zip(templates, rows, strict=True)]
+
+
+def _change_point(window: Window, template: Template, reach: float, settings: Settings) -> float | None:
+    """Where along x, from its start to `reach`, the ridge ends; None if there are too few points."""
+    points = window(template, 1.0, 2 * reach / template.length)
+    if len(points) < FEWEST_POINTS:
+        return None
+    # Far ahead the slopes are extrapolation: neither height nor width may change by more than a third.
+    bend, rise, widening = template.trend
+    most, widest = 0.3 * abs(template.height) / reach, 0.3 * template.width / reach
+    trend = np.array([bend, min(max(rise, -most), most), min(max(widening, -widest), widest)])
+    # Errors of the extrapolation must not count as noise.
+    scale = max(template.scale, 0.1 * abs(template.height))
+    end = chain.change_point(
+        points,
+        template.height,
+        template.width,
+        trend,
+        template.section.table,
+        scale,
+        *loss_of(settings),
+    )
+    return max(float(end), -0.5 * template.length)
+
+
+def _trim_end(window: Window, templates: list[Template], settings: Settings) -> list[Template]:
+    """Templates whose last one ends where the ridge does: shortened, lengthened or dropped."""
+    templates = [*templates[:-2], *trends(templates[-3:])[-2:]]
+    while True:
+        last = templates[-1]
+        model = _as_expected(templates, settings)
+        end = _change_point(window, model, 1.5 * last.length, settings)
+        if end is None:
+            return templates
+        end += float(last.rotation[:, 0] @ (model.position - last.position))
+        rest = end + 0.5 * last.length
+        if rest >= 0.45 * last.length or len(templates) == 1:
+            end = max(end, 0.0) if len(templates) == 1 else min(end, last.length)
+            return [*templates[:-1], _relength(last, -0.5 * last.length, end)]
+        templates = templates[:-1]
+
+
+def _as_expected(templates: list[Template], settings: Settings) -> Template:
+    """The last template as those before it let expect it.
+
+    A template that lies half beyond the end is fitted too low or too narrow, and too steep: such a ridge
+    looks as if it went on for ever. So its height and width are those expected where these are more. One that
+    hardly stands out may lie on noise alone: it is put where the path leads.
+    """
+    last, inner = templates[-1], templates[-1 - _BEFORE_END : -1]
+    if not inner:
+        return last
+    places = np.array([t.position for t in templates[-1 - len(inner) :]])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    sizes = np.array([(t.height, t.width) for t in inner])
+    (height, width), slopes = _extrapolated(-np.cumsum(steps[::-1])[::-1], sizes)
+    height = height if abs(height) > abs(last.height) else last.height
+    model = last.changed(
+        height=float(height),
+        width=float(max(width, last.width)),
+        trend=np.array([last.trend[0], *slopes]),
+        scale=float(np.median([t.scale for t in (*inner, last)])),
+    )
+    if last.evidence > _BEYOND_CHANCE * settings.going_on:
+        return model
+    frames = np.array([t.rotation for t in inner[-3:]])
+    found = chain.starts(places[:-1][-3:], frames, inner[-1].length, last.length)
+    return model.changed(position=found[0][0], rotation=found[1][0], trend=np.array([0.0, *slopes]))
+
+
+def _extrapolated(at: Array, sizes: Array) -> tuple[Array, Array]:
+    """Heights and widths (n, 2) at distances (n,) before 0, continued by a straight line to 0; its slopes.
+
+    They change by less than a third of the last ones.
+    """
+    ahead = at - at.mean()
+    square = ahead @ ahead
+    slopes = ahead @ sizes / square if square > 0 else np.zeros(2)
+    change = sizes.mean(axis=0) - slopes * at.mean() - sizes[-1]
+    return sizes[-1] + np.clip(change, -0.3 * abs(sizes[-1]), 0.3 * abs(sizes[-1])), slopes
+
+
+def _relength(template: Template, low: float, high: float) -> Template:
+    """The patch from x = low to x = high of the template's own frame, on its bent path."""
+    middle = 0.5 * (low + high)
+    bend = template.trend[0]
+    turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
+    shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
+    return template.changed(
+        position=template.position + template.rotation @ shift,
+        rotation=template.rotation @ turn,
+        length=float(high - low),
+        height=float(template.height + template.trend[1] * middle),
+        width=float(max(template.width + template.trend[2] * middle, 0.5 * template.width)),
+    )
+
+
+def place_ends(window: Window, track: Track, settings: Settings) -> Track:
+    """The track with its end templates cut to where the ridge ends, unless it goes on beyond the march."""
+    templates = list(track.templates)
+    if not track.stop[1].startswith(GOES_ON):
+        templates = _trim_end(window, templates, settings)
+    if not track.stop[0].startswith(GOES_ON):
+        backwards = _trim_end(window, [reverse(t) for t in reversed(templates)], settings)
+        templates = [reverse(t) for t in reversed(backwards)]
+    return Track(tuple(templates), track.stop)
