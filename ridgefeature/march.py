@@ -31,7 +31,7 @@ _POOR_START = 0.5
 _HOPELESS = 3.0
 """Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
-"""A fit whose noise is this many times that of the template before it is suspect."""
+"""A fit whose noise is this many times that of the last three templates is suspect."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -123,12 +123,22 @@ def _fit_next(
     before, the other starts are tried, and last all points of the window instead of some; the best fit is
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
-    start, fitted, why = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
-    if why.startswith(_FLAT) and chain[-1].evidence < _WEAK * settings.going_on:
-        longer = _fit_best(rough, full, chain, append(chain, settings, longest=True), gap, settings)
+    found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    if not found[2].startswith(_FLAT) or chain[-1].evidence > _WEAK * settings.going_on:
+        return found
+    for known in (chain, _without_last(chain, settings)):
+        longer = _fit_best(rough, full, known, append(known, settings, longest=True), gap, settings)
         if not longer[2]:
             return longer
-    return start, fitted, why
+    return found
+
+
+def _without_last(chain: list[Template], settings: Settings) -> list[Template]:
+    """The chain with its last template put where those before it lead: it may have been a bad fit."""
+    if len(chain) < 3:
+        return chain
+    last, expected = chain[-1], append(chain[:-1], settings)[0]
+    return [*chain[:-1], expected.changed(length=last.length, points=last.points, evidence=last.evidence)]
 
 
 def _fit_best(
@@ -136,6 +146,7 @@ def _fit_best(
 ) -> tuple[Template, Template, str]:
     """The start whose fit is best, this fit, and why it is none."""
     starts, alike = _unlike(starts)
+    suspect = _WORSE * max(t.scale for t in chain[-3:])
     if len(starts) > 1 and start_loss(rough, starts[0], chain[-1].scale) > _POOR_START:
         starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
     best: tuple[Template, Template, str] | None = None
@@ -147,7 +158,7 @@ def _fit_best(
         why = _reject(fitted, start, settings, gap)
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
-        if fitted.status == "no data" or (not why and fitted.scale < _WORSE * chain[-1].scale):
+        if fitted.status == "no data" or (not why and fitted.scale < suspect):
             break
     return best  # type: ignore[return-value]
 

@@ -38,7 +38,8 @@ def marched():
 
 
 @pytest.mark.parametrize(
-    ("n", "noise", "seed"), [(12000, 0.1, 1), (12000, 0.1, 2), (10000, 0.3, 3), (10000, 0.0, 4)]
+    ("n", "noise", "seed"),
+    [(12000, 0.1, 1), (12000, 0.1, 2), (10000, 0.0, 4), *((10000, 0.3, seed) for seed in range(20))],
 )
 def test_the_spiral_is_covered_and_both_ends_lie_within_one_width(n, noise, seed):
     found = spiral_ridge(n, noise, seed)
