@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import statistics
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,34 +84,37 @@ def _as_expected(templates: list[Template], settings: Settings) -> Template:
     last, inner = templates[-1], templates[-1 - _BEFORE_END : -1]
     if not inner:
         return last
-    places = np.array([t.position for t in templates[-1 - len(inner) :]])
-    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    sizes = np.array([(t.height, t.width) for t in inner])
-    (height, width), slopes = _extrapolated(-np.cumsum(steps[::-1])[::-1], sizes)
-    height = height if abs(height) > abs(last.height) else last.height
+    places = np.array([t.position for t in (*inner, last)])
+    height, rise = _extrapolated(places, [t.height for t in inner])
+    width, widening = _extrapolated(places, [t.width for t in inner])
     model = last.changed(
-        height=float(height),
-        width=float(max(width, last.width)),
-        trend=np.array([last.trend[0], *slopes]),
-        scale=float(np.median([t.scale for t in (*inner, last)])),
+        height=height if abs(height) > abs(last.height) else last.height,
+        width=max(width, last.width),
+        trend=np.array([last.trend[0], rise, widening]),
+        scale=statistics.median([t.scale for t in (*inner, last)]),
     )
     if last.evidence > _BEYOND_CHANCE * settings.going_on:
         return model
     frames = np.array([t.rotation for t in inner[-3:]])
     found = chain.starts(places[:-1][-3:], frames, inner[-1].length, last.length)
-    return model.changed(position=found[0][0], rotation=found[1][0], trend=np.array([0.0, *slopes]))
+    trend = np.array([0.0, rise, widening])
+    return model.changed(position=found[0][0], rotation=found[1][0], trend=trend)
 
 
-def _extrapolated(at: Array, sizes: Array) -> tuple[Array, Array]:
-    """Heights and widths (n, 2) at distances (n,) before 0, continued by a straight line to 0; its slopes.
+def _extrapolated(places: Array, values: list[float]) -> tuple[float, float]:
+    """Values at all places (n, 3) but the last as a straight line continues them to the last; its slope.
 
-    They change by less than a third of the last ones.
+    The value changes by less than a third of the last one.
     """
-    ahead = at - at.mean()
-    square = ahead @ ahead
-    slopes = ahead @ sizes / square if square > 0 else np.zeros(2)
-    change = sizes.mean(axis=0) - slopes * at.mean() - sizes[-1]
-    return sizes[-1] + np.clip(change, -0.3 * abs(sizes[-1]), 0.3 * abs(sizes[-1])), slopes
+    before = [0.0]
+    for a, b in zip(places[-2::-1], places[:0:-1], strict=True):
+        before.append(before[-1] - math.dist(a, b))
+    at = before[:0:-1]
+    middle, mean = sum(at) / len(at), sum(values) / len(at)
+    square = sum((x - middle) ** 2 for x in at)
+    slope = sum((x - middle) * v for x, v in zip(at, values, strict=True)) / square if square > 0 else 0.0
+    most = 0.3 * abs(values[-1])
+    return values[-1] + min(max(mean - slope * middle - values[-1], -most), most), slope
 
 
 def _relength(template: Template, low: float, high: float) -> Template:

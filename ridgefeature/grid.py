@@ -37,10 +37,13 @@ class Grid:
     frame: Floats
 
 
-def build_grid(points: npt.ArrayLike) -> Grid:
-    """Index points (n, 3), n >= 1. Raises ValueError unless they are finite and of that shape."""
+def build_grid(points: npt.ArrayLike, bounds: Floats | None = None) -> Grid:
+    """Index points (n, 3), n >= 1. Raises ValueError unless they are finite and of that shape.
+
+    bounds (2, 3): their least and greatest coordinates, where these are known and finite.
+    """
     rows = as_points(points)
-    box, bad = kernels.bounds(rows)
+    box, bad = kernels.bounds(rows) if bounds is None else (bounds.ravel(), -1)
     if bad >= 0:
         raise ValueError(
             f"expected finite coordinates (below {kernels.LIMIT:g}), got {rows[bad].tolist()} in row {bad}; "

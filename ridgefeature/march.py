@@ -103,8 +103,12 @@ def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = F
 
 def _meets(template: Template, others: list[Template]) -> bool:
     """Whether a template lies on one of the others."""
-    for other in others:
-        local = other.rotation.T @ (template.position - other.position)
+    if not others:
+        return False
+    apart = np.array([other.position for other in others]) - template.position
+    for i in np.flatnonzero((apart * apart).sum(axis=1) < (2 * (template.length + template.width)) ** 2):
+        other = others[i]
+        local = other.rotation.T @ apart[i]
         if (
             abs(local[0]) < 0.5 * other.length
             and abs(local[1]) < 0.5 * other.width

@@ -62,7 +62,7 @@ def register(
     settings = _settings(settings, max_templates)
     if roi is not None:
         scan = scan.crop(pick, _positive(roi, "roi"))
-    grid = build_grid(scan.points)
+    grid = build_grid(scan.points, scan.bounds)
     spacing = _spacing(grid, pick)
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
     _check_pick(grid, pick, spacing, extent)

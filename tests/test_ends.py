@@ -52,13 +52,10 @@ def test_where_the_ridge_explains_nothing_there_is_no_end():
 
 
 def test_heights_and_widths_go_on_straight_but_change_by_less_than_a_third():
-    at = np.array([-30.0, -20.0, -10.0])
-    (h, w), slopes = _extrapolated(at, np.array([[3.0, 9.0], [2.8, 8.0], [2.6, 7.0]]))
-    assert (h, w) == pytest.approx((2.4, 6.0)) and slopes == pytest.approx([-0.02, -0.1])
-    (h, w), _ = _extrapolated(at, np.array([[9.0, 9.0], [6.0, 6.0], [3.0, 3.0]]))
-    assert (h, w) == pytest.approx((2.1, 2.1))
-    (h, w), slopes = _extrapolated(at[:1], np.array([[2.0, 6.0]]))
-    assert (h, w) == (2.0, 6.0) and (slopes == 0).all()
+    places = np.array([[-30.0, 0, 0], [-20.0, 0, 0], [-10.0, 0, 0], [0.0, 0, 0]])
+    assert _extrapolated(places, [3.0, 2.8, 2.6]) == pytest.approx((2.4, -0.02))
+    assert _extrapolated(places, [9.0, 6.0, 3.0]) == pytest.approx((2.1, -0.3))
+    assert _extrapolated(places[-2:], [2.0]) == (2.0, 0.0)
 
 
 def test_trends_are_the_curvature_and_slopes_of_a_ring_that_tapers():

@@ -285,3 +285,10 @@ def test_no_queries_give_no_answers():
     distances, found = nearest(build_grid(np.zeros((3, 3))), np.zeros((0, 3)), 2)
     assert distances.shape == (0, 2)
     assert found.shape == (0, 2, 3)
+
+
+def test_a_grid_is_the_same_with_its_bounds_given():
+    points = np.random.default_rng(3).normal(size=(500, 3))
+    own, given = build_grid(points), build_grid(points, np.array([points.min(axis=0), points.max(axis=0)]))
+    for a, b in zip(vars(own).values(), vars(given).values(), strict=True):
+        np.testing.assert_array_equal(a, b)
