@@ -40,22 +40,38 @@ def section_poles(section: Section) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=16)
-def _interpolation(k: int) -> tuple[Array, Array]:
-    """Not-a-knot cubic knots on [0, 1] for k even sites, and the inverse of the interpolation matrix."""
+def interpolation(k: int, closed: bool = False) -> tuple[Array, Array]:
+    """Cubic knots on [0, 1] for values at k even sites, and the map (n_poles, k) from values to poles.
+
+    Not-a-knot, k poles; closed: C2 from the last site, which is the first again, to the first, k + 2 poles.
+    """
     sites = np.linspace(0.0, 1.0, k)
-    knots = np.concatenate([np.zeros(4), sites[2:-2], np.ones(4)])
-    inverse = np.asarray(np.linalg.inv(basis_matrix(knots, DEGREE, sites)), dtype=np.float64)
+    knots = np.concatenate([np.zeros(4), sites[1:-1] if closed else sites[2:-2], np.ones(4)])
+    matrix = basis_matrix(knots, DEGREE, sites)
+    if closed:
+        ends = [basis_matrix(knots, DEGREE, np.array([0.0, 1.0]), d) for d in (1, 2)]
+        # divided by their size, derivatives condition the matrix no worse than values do
+        matrix = np.vstack([matrix, *((e[0] - e[1]) / np.abs(e).max() for e in ends)])
+    inverse = np.asarray(np.linalg.inv(matrix)[:, :k], dtype=np.float64)
     knots.setflags(write=False)
     inverse.setflags(write=False)
     return knots, inverse
 
 
-def along(arc_length: Array, values: Array, at: Array, derivative: int = 0) -> Array:
+def along(arc_length: Array, values: Array, at: Array, derivative: int = 0, closed: bool = False) -> Array:
     """The C2 spline through values (k, ...) at even arc lengths (k,), or its derivative, at `at` (m,)."""
-    knots, inverse = _interpolation(len(arc_length))
+    knots, inverse = interpolation(len(arc_length), closed)
     total = arc_length[-1]
     basis = basis_matrix(knots * total, DEGREE, np.clip(at, 0.0, total), derivative)
     return np.tensordot(basis @ inverse, values, 1)
+
+
+def row_controls(section: Section, width: Array, border: Array, height: Array) -> tuple[Array, Array]:
+    """Control values (k, n) of each row: distance sideways and height over the base."""
+    eta, raised = section_poles(section)
+    sideways = width[:, None] * eta
+    sideways[:, 0], sideways[:, -1] = -border, border
+    return sideways, height[:, None] * raised
 
 
 def merged_surface(
@@ -74,15 +90,9 @@ def merged_surface(
     affine in height and in width, so what does not change with them is not worked out again. u is arc length,
     v the distance from the spine in widths (on the ridge; on the flanks it runs on to the border).
     """
-    eta, raised = section_poles(section)
-    knots, inverse = _interpolation(len(arc_length))
-    sideways = width[:, None] * eta
-    sideways[:, 0], sideways[:, -1] = -border, border
-    rows = (
-        spine[:, None]
-        + sideways[..., None] * across[:, None]
-        + (height[:, None] * raised)[..., None] * normal[:, None]
-    )
+    knots, inverse = interpolation(len(arc_length))
+    sideways, raised = row_controls(section, width, border, height)
+    rows = spine[:, None] + sideways[..., None] * across[:, None] + raised[..., None] * normal[:, None]
     poles = np.tensordot(inverse, rows, 1)
     return Surface(poles, knots * arc_length[-1], section_knots(section), DEGREE, DEGREE)
 

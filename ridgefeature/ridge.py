@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ridgefeature.base import Base
 from ridgefeature.bspline import Surface
+from ridgefeature.fitting import stretched
 from ridgefeature.merge import LEAST_BORDER, along, merged_surface
+from ridgefeature.on_base import surface_on
 from ridgefeature.scan import Scan, Source
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -77,12 +80,24 @@ class Ridge(Stations):
             self.section,
         )
 
-    def surface(self) -> Surface:
+    def surface(self, base: Base | None = None) -> Surface:
         """The finished surface, C2 and bicubic: u is arc length, v the distance from the spine in widths.
 
-        Poles depend on the stations alone; for the same stations they are affine in height and in width.
+        On a base (see ridgefeature.base), the ridge stands on that: the spine and both feet lie on it, and
+        heights are along its normals. Poles depend on base and stations alone; for the same stations they
+        are affine in height, without a base in width, too. Raises ValueError for a base of another length,
+        for which `stretched` fits the ridge, or one that gives no finite points.
         """
-        return self._surface
+        return self._surface if base is None else surface_on(base, self, self.section)
+
+    def stretched(self, length: float, fit: str = "length") -> Ridge:
+        """A ridge of another arc length, its stations even along it; standard deviations follow.
+
+        fit: "length" stretches path and profile along and keeps height, width and border; "scale" scales
+        them too; "trim" cuts the ridge at that length. Templates stay as they were fitted. Raises ValueError
+        for a length that is not above 0, another fit, or a length to trim to that is beyond the ridge's.
+        """
+        return stretched(self, length, fit)
 
     def resized(
         self,

@@ -1,0 +1,100 @@
+"""Ridges fitted to another path: of another length, mirrored, or joined to a ring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.base import unit
+from ridgefeature.merge import along
+from ridgefeature.section import Section
+
+if TYPE_CHECKING:
+    from ridgefeature.ridge import Ridge
+
+Array = NDArray[np.float64]
+
+FITS = ("length", "scale", "trim")
+_FEWEST = 13
+
+
+def stretched(ridge: Ridge, length: float, fit: str = "length") -> Ridge:
+    """A ridge of another arc length; see Ridge.stretched."""
+    try:
+        goal = float(length)
+    except (TypeError, ValueError):
+        goal = np.nan
+    if not (np.isfinite(goal) and goal > 0):
+        raise ValueError(f"length: expected a finite number above 0, got {length!r}")
+    if fit not in FITS:
+        raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
+    if fit == "trim":
+        return _trimmed(ridge, goal)
+    rate = goal / ridge.length
+    sized = ("height", "width", "height_std", "width_std", "border") if fit == "scale" else ()
+    changes: dict[str, Any] = {name: rate * getattr(ridge, name) for name in sized}
+    return replace(
+        ridge,
+        arc_length=np.linspace(0.0, goal, len(ridge.arc_length)),
+        spine=ridge.spine[0] + rate * (ridge.spine - ridge.spine[0]),
+        **changes,
+    )
+
+
+def _trimmed(ridge: Ridge, length: float) -> Ridge:
+    if length > ridge.length * (1 + 1e-9):
+        raise ValueError(
+            f"length: expected at most {ridge.length:g}, the ridge's own, to trim it, got {length:g}; "
+            'use fit="length" or "scale"'
+        )
+    step = float(ridge.arc_length[1])
+    s = np.linspace(0.0, length, max(_FEWEST, int(np.ceil(length / step - 1e-9)) + 1))
+    names = ("spine", "tangent", "normal", "height", "width", "border")
+    at: dict[str, Any] = {name: along(ridge.arc_length, getattr(ridge, name), s) for name in names}
+    at["tangent"] = unit(at["tangent"])
+    square = (at["normal"] * at["tangent"]).sum(axis=1, keepdims=True)
+    at["normal"] = unit(at["normal"] - at["tangent"] * square)
+    # a spline through deviations may overshoot below zero; straight lines do not
+    for name in ("height_std", "width_std"):
+        std = np.interp(s, ridge.arc_length, getattr(ridge, name))
+        at[name] = np.nan_to_num(std, nan=np.inf, posinf=np.inf)  # unknown ones are infinite
+    return replace(ridge, arc_length=s, closed=False, **at)
+
+
+def mirrored(ridge: Ridge) -> Ridge:
+    """The ridge reflected at the plane through the middle of its path, along tangent and normal there.
+
+    What lay to the left of the path lies to its right; arc lengths, heights and widths stay.
+    """
+    i = len(ridge.arc_length) // 2
+    across = ridge.across[i] / np.linalg.norm(ridge.across[i])
+    turn = np.eye(3) - 2 * np.outer(across, across)
+    return replace(
+        ridge,
+        spine=ridge.spine[i] + (ridge.spine - ridge.spine[i]) @ turn,
+        tangent=ridge.tangent @ turn,
+        normal=ridge.normal @ turn,
+        section=Section(ridge.section.coefficients[::-1], ridge.section.name),
+    )
+
+
+def joined(ridge: Ridge) -> Ridge:
+    """The ridge with height, width and border blended at both ends to their mean there, for a closed base.
+
+    The blend takes one width at each end, or a third of the ridge where that is less.
+    """
+    reach = min(float(max(ridge.width[0], ridge.width[-1])), ridge.length / 3)
+    reach = max(reach, 1.5 * float(ridge.arc_length[1]))
+    near = 1 - np.minimum(ridge.arc_length, ridge.length - ridge.arc_length) / reach
+    x = np.clip(near, 0.0, 1.0)
+    share = x**3 * (10 - 15 * x + 6 * x * x)
+    changes: dict[str, Any] = {}
+    for name in ("height", "width", "border"):
+        old = getattr(ridge, name)
+        new = old + share * (0.5 * (old[0] + old[-1]) - old)
+        new[-1] = new[0]
+        changes[name] = new
+    return replace(ridge, closed=True, **changes)
