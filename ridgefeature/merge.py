@@ -15,24 +15,24 @@ from ridgefeature.template import Template
 Array = NDArray[np.float64]
 
 DEGREE = 3
-_OUTSIDE = 0.1
+OUTSIDE = 0.1
 """Breadth of the flank's knot span, in widths."""
-LEAST_BORDER = 0.5 + 2 * _OUTSIDE / 3
+LEAST_BORDER = 0.5 + 2 * OUTSIDE / 3
 """The border must lie further out than this many widths, or the flank's control points would cross."""
 
 
-def section_knots(section: Section) -> Array:
+def section_knots(section: Section, flank: float = OUTSIDE) -> Array:
     """Knots across, in widths: simple at feet and between, the end of the flanks repeated."""
-    end = np.full(DEGREE + 1, 0.5 + _OUTSIDE)
+    end = np.full(DEGREE + 1, 0.5 + flank)
     return np.concatenate([-end, np.linspace(-0.5, 0.5, section.spans + 1), end])
 
 
-def section_poles(section: Section) -> tuple[Array, Array]:
+def section_poles(section: Section, flank: float = OUTSIDE) -> tuple[Array, Array]:
     """Control points of one row, (n,) positions across in widths and (n,) heights in apex heights.
 
     The outermost are the flanks' borders, which follow no width; their position here is not used.
     """
-    knots = section_knots(section)
+    knots = section_knots(section, flank)
     across = greville(knots, DEGREE)
     raised = np.zeros(len(across))
     raised[DEGREE + 1 : DEGREE + 1 + len(section.coefficients)] = section.coefficients
@@ -66,9 +66,11 @@ def along(arc_length: Array, values: Array, at: Array, derivative: int = 0, clos
     return np.tensordot(basis @ inverse, values, 1)
 
 
-def row_controls(section: Section, width: Array, border: Array, height: Array) -> tuple[Array, Array]:
+def row_controls(
+    section: Section, width: Array, border: Array, height: Array, flank: float = OUTSIDE
+) -> tuple[Array, Array]:
     """Control values (k, n) of each row: distance sideways and height over the base."""
-    eta, raised = section_poles(section)
+    eta, raised = section_poles(section, flank)
     sideways = width[:, None] * eta
     sideways[:, 0], sideways[:, -1] = -border, border
     return sideways, height[:, None] * raised

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from ridgefeature.base import Base, unit
 from ridgefeature.basis import basis_matrix, greville
 from ridgefeature.bspline import Surface
-from ridgefeature.merge import DEGREE, LEAST_BORDER, along, interpolation, row_controls, section_knots
+from ridgefeature.merge import (
+    DEGREE,
+    LEAST_BORDER,
+    OUTSIDE,
+    along,
+    interpolation,
+    row_controls,
+    section_knots,
+)
 from ridgefeature.section import Section
 from ridgefeature.stations import Stations
 
@@ -38,6 +46,8 @@ class _Layout:
     """(n, k) from values at the stations to values at the rows."""
     knots_u: Array
     rows_to_poles: Array
+    flank: float
+    """Breadth of the flanks' knot spans, in widths."""
     knots_v: Array
     across: Array
     """(m, section's poles) from control values of a row to its values at the columns' sites."""
@@ -63,7 +73,7 @@ def surface_on(base: Base, stations: Stations, section: Section) -> Surface:
     _check(base, stations)
     layout = _kept_layout(base, stations, section)
     width, border, height = (layout.spread @ x for x in (stations.width, stations.border, stations.height))
-    sideways, raised = row_controls(section, width, border, height)
+    sideways, raised = row_controls(section, width, border, height, layout.flank)
     points, normals = _on(base, layout.s, sideways @ layout.across.T)
     values = points + (raised @ layout.across.T)[..., None] * normals
     columns = np.matmul(layout.columns_to_poles, values)
@@ -108,35 +118,34 @@ def _on(base: Base, s: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _kept_layout(base: Base, stations: Stations, section: Section) -> _Layout:
-    # knots change with the octave of the width only, so that most other widths change the poles alone
-    share = float((stations.width * LEAST_BORDER / stations.border).min())
-    narrow = float(np.clip(2.0 ** np.floor(np.log2(share)), 1 / 16, 0.5))
-    key = (len(stations.arc_length), section.spans, stations.border.tobytes(), narrow)
+    flank = _octave(float((stations.border / stations.width).min()) - 0.5)
+    key = (len(stations.arc_length), section.spans, stations.border.tobytes(), flank)
     try:
         kept = _LAYOUTS.setdefault(base, {})
     except TypeError:  # neither hashable nor weakly referenced: nothing is kept
         kept = {}
     if key not in kept:
-        kept[key] = _layout(base, stations, section, narrow)
+        kept[key] = _layout(base, stations, section, flank)
     return kept[key]
 
 
-def _layout(base: Base, stations: Stations, section: Section, narrow: float) -> _Layout:
+def _layout(base: Base, stations: Stations, section: Section, flank: float) -> _Layout:
     k = len(stations.arc_length)
     parts = _row_parts(base, stations.border)
     n = parts * (k - 1) + 1
     s = np.linspace(0.0, base.length, n)
     spread = _spread(k, n, base.closed)
     knots, inverse = interpolation(n, base.closed)
-    knots_v = _columns(base, s, spread @ stations.border, section, narrow)
+    knots_v, flank = _columns(base, s, spread @ stations.border, section, flank)
     sites = greville(knots_v, DEGREE)
     return _Layout(
         s,
         spread,
         knots * base.length,
         inverse,
+        flank,
         knots_v,
-        basis_matrix(section_knots(section), DEGREE, sites),
+        basis_matrix(section_knots(section, flank), DEGREE, sites),
         np.asarray(np.linalg.inv(basis_matrix(knots_v, DEGREE, sites)), dtype=np.float64),
     )
 
@@ -165,52 +174,59 @@ def _row_parts(base: Base, border: Array) -> int:
     return parts
 
 
-def _columns(base: Base, s: Array, border: Array, section: Section, narrow: float) -> Array:
-    """The section's knots, with spans of flanks and ridge cut until every row lies on the base.
+def _octave(breadth: float) -> float:
+    """The power of 2 that a flank of such breadth in widths has for its knot span.
 
-    Looked at are the widest ridge that the flanks hold and `narrow` of that.
+    Knots change with the octave of the width only, so that most other widths change the poles alone. The
+    power is near enough for positions to run evenly over the flank, and never so large that they turn back.
+    """
+    return float(2.0 ** np.floor(np.log2(breadth * np.sqrt(2))))
+
+
+def _columns(base: Base, s: Array, border: Array, section: Section, flank: float) -> tuple[Array, float]:
+    """Knots across and the breadth of the flanks' spans: the flat ridge's where they do, or finer ones.
+
+    Finer ones are cut evenly on each flank and between the feet, and looked at for both ends of the octave.
     """
     chosen = np.unique(np.linspace(0, len(s) - 1, min(len(s), 33)).round().astype(np.intp))
     s, border = s[chosen], border[chosen]
-    tolerance = ACROSS * narrow * float(border.min()) / LEAST_BORDER
-    breaks = np.unique(section_knots(section))
+    tolerance = ACROSS * float(border.min()) / (0.5 + flank)
+    widest = border / LEAST_BORDER
+    plain = section_knots(section)
+    if all(
+        _errors_across(base, s, w, border, section, plain, OUTSIDE).max() < tolerance
+        for w in (widest, 0.25 * widest)
+    ):
+        return plain, OUTSIDE
+    breaks = np.unique(section_knots(section, flank))
+    widths = [np.minimum(border / (0.5 + flank * x), widest) for x in (0.5**0.5, 2**0.5)]
     parts = np.ones(3, dtype=np.intp)  # left flank, ridge, right flank
     for _ in range(8):
         knots = _cut(breaks, parts)
-        error = np.maximum(*(_errors_across(base, s, border, w, section, knots) for w in (1.0, narrow)))
+        error = np.maximum(*(_errors_across(base, s, w, border, section, knots, flank) for w in widths))
         # an error spreads to its neighbours: first mend where it is largest
         wrong = (error > tolerance) & (error > 0.3 * error.max()) & (parts < _MOST_SPLITS)
         if not wrong.any():
             break
         more = np.ceil(parts * (1.1 * error / tolerance) ** 0.25).astype(np.intp)
         parts = np.where(wrong, np.clip(more, parts + 1, np.minimum(3 * parts, _MOST_SPLITS)), parts)
-    return _cut(breaks, parts)
+    return _cut(breaks, parts), flank
 
 
 def _cut(breaks: Array, parts: NDArray[np.intp]) -> Array:
     """Knots with the left flank, each span of the ridge and the right flank in so many parts."""
-    left, ridge, right = parts.tolist()
-    # the flank's control points lie far apart at the border, so knots are closer there
-    start = 1 - np.sqrt(1 - np.arange(left) / left)
-    end = np.sqrt(np.arange(right) / right)
-    inner = np.linspace(breaks[1], breaks[-2], ridge * (len(breaks) - 3), endpoint=False)
-    return np.concatenate(
-        [
-            np.full(DEGREE, breaks[0]),
-            breaks[0] + (breaks[1] - breaks[0]) * start,
-            inner,
-            breaks[-2] + (breaks[-1] - breaks[-2]) * end,
-            np.full(DEGREE + 1, breaks[-1]),
-        ]
-    )
+    each = np.full(len(breaks) - 1, parts[1])
+    each[0], each[-1] = parts[0], parts[2]
+    inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks, breaks[1:], each, strict=False)]
+    return np.concatenate([np.full(DEGREE, breaks[0]), *inner, np.full(DEGREE + 1, breaks[-1])])
 
 
 def _errors_across(
-    base: Base, s: Array, border: Array, width: float, section: Section, knots: Array
+    base: Base, s: Array, width: Array, border: Array, section: Section, knots: Array, flank: float
 ) -> Array:
     """Largest distance of the rows from the base on left flank, ridge and right flank."""
-    coarse = section_knots(section)
-    controls, _ = row_controls(section, width * border / LEAST_BORDER, border, 0 * border)
+    coarse = section_knots(section, flank)
+    controls, _ = row_controls(section, width, border, 0 * border, flank)
     sites = greville(knots, DEGREE)
     points, _ = _on(base, s, controls @ basis_matrix(coarse, DEGREE, sites).T)
     poles = np.matmul(np.linalg.inv(basis_matrix(knots, DEGREE, sites)), points)
