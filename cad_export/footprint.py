@@ -1,0 +1,244 @@
+"""A closed loop of curves on a face of the host: parameters, parameter curves, and what the loop must not cross.
+
+OCP only, no cadquery.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve2d
+from OCP.BRepTools import BRepTools
+from OCP.Geom import Geom_Surface
+from OCP.Geom2d import Geom2d_BSplineCurve
+from OCP.GeomAbs import (
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Line,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
+from OCP.GeomAdaptor import GeomAdaptor_Surface
+from OCP.GeomAPI import GeomAPI
+from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
+from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Wire
+
+from cad_export.geometry import to_occt
+from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interpolate
+
+Floats = NDArray[np.float64]
+
+_SPLIT = 2  # knot spans of a parameter curve for each one of its edge
+_ACROSS = np.array([0.0, 0.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class HostSurface:
+    """The surface of a host face, placed, with its inverse: parameters of points on it."""
+
+    geometry: Geom_Surface
+
+    @cached_property
+    def _adaptor(self) -> GeomAdaptor_Surface:
+        return GeomAdaptor_Surface(self.geometry)
+
+    @cached_property
+    def plane(self) -> gp_Pln | None:
+        """The plane, if it is one."""
+        return self._adaptor.Plane() if self._adaptor.GetType() == GeomAbs_Plane else None
+
+    @cached_property
+    def periods(self) -> tuple[float, float]:
+        """Length of the parameter range along u and v where the surface closes on itself, else 0."""
+        g, (u0, u1, v0, v1) = self.geometry, self.geometry.Bounds()
+        return (u1 - u0 if g.IsUClosed() else 0.0), (v1 - v0 if g.IsVClosed() else 0.0)
+
+    def parameters(self, points: Floats) -> Floats:
+        """(n, 2) parameters of the nearest points of the surface to points (n, 3), continuous along them."""
+        kind = self._adaptor.GetType()
+        inverse = {
+            GeomAbs_Plane: self._on_plane,
+            GeomAbs_Cylinder: self._on_cylinder,
+            GeomAbs_Cone: self._on_cone,
+            GeomAbs_Sphere: self._on_sphere,
+            GeomAbs_Torus: self._on_torus,
+        }.get(kind, self._on_other)
+        uv = inverse(points)
+        for k, period in enumerate(self.periods):
+            if period:
+                uv[:, k] = np.unwrap(uv[:, k], period=period)
+        return uv
+
+    def points(self, uv: Floats) -> Floats:
+        """(n, 3) points of the surface at parameters (n, 2)."""
+        found = [self._adaptor.Value(u, v) for u, v in uv.tolist()]
+        return np.array([(p.X(), p.Y(), p.Z()) for p in found])
+
+    def _on_plane(self, points: Floats) -> Floats:
+        return _local(self._adaptor.Plane().Position(), points)[:, :2]
+
+    def _on_cylinder(self, points: Floats) -> Floats:
+        x, y, z = _local(self._adaptor.Cylinder().Position(), points).T
+        return np.column_stack([np.arctan2(y, x), z])
+
+    def _on_cone(self, points: Floats) -> Floats:
+        cone = self._adaptor.Cone()
+        x, y, z = _local(cone.Position(), points).T
+        a = cone.SemiAngle()
+        v = (np.hypot(x, y) - cone.RefRadius()) * np.sin(a) + z * np.cos(a)
+        return np.column_stack([np.arctan2(y, x), v])
+
+    def _on_sphere(self, points: Floats) -> Floats:
+        x, y, z = _local(self._adaptor.Sphere().Position(), points).T
+        return np.column_stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))])
+
+    def _on_torus(self, points: Floats) -> Floats:
+        torus = self._adaptor.Torus()
+        x, y, z = _local(torus.Position(), points).T
+        return np.column_stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y) - torus.MajorRadius())])
+
+    def _on_other(self, points: Floats) -> Floats:
+        analysis = ShapeAnalysis_Surface(self.geometry)
+        uv = np.empty((len(points), 2))
+        last = None
+        for i, p in enumerate(points.tolist()):
+            at = gp_Pnt(*p)
+            last = analysis.ValueOfUV(at, 1e-9) if last is None else analysis.NextValueOfUV(last, at, 1e-9)
+            uv[i] = last.X(), last.Y()
+        return uv
+
+
+def _local(axes: gp_Ax3, points: Floats) -> Floats:
+    """Points in the coordinates of a placement."""
+    d = (axes.XDirection(), axes.YDirection(), axes.Direction())
+    frame = np.array([(k.X(), k.Y(), k.Z()) for k in d])
+    o = axes.Location()
+    return (points - np.array([o.X(), o.Y(), o.Z()])) @ frame.T
+
+
+@dataclass(frozen=True)
+class OnHost:
+    """A curve's parameter curve on the host, a polyline along it, and how far the curve is off the host."""
+
+    curve: Geom2d_BSplineCurve
+    polyline: Floats
+    distance: float
+
+
+def on_host(
+    host: HostSurface, curve: Curve, span: tuple[float, float], start: Floats | None, forward: bool = True
+) -> OnHost:
+    """The parameter curve of a space curve's stretch, with the curve's own parameter.
+
+    start: (2,) parameters from which it goes on where the surface is periodic; the polyline begins there.
+    With forward=False it runs against the curve.
+    """
+    knots = _refined(curve.knots, curve.degree, span, _SPLIT)
+    sites = greville(knots, curve.degree)
+    uv = host.parameters(curve(sites))
+    shift = np.zeros(2) if start is None else start - uv[0 if forward else -1]
+    for k, period in enumerate(host.periods):
+        if period:
+            uv[:, k] += period * np.round(shift[k] / period)
+    poles = interpolate(knots, curve.degree, uv)
+    flat = Curve(poles, knots, curve.degree)
+    inner = _refined(curve.knots, curve.degree, span, 2 * _SPLIT)[curve.degree : -curve.degree]
+    at = np.union1d(inner, 0.5 * (inner[1:] + inner[:-1]))
+    off = np.linalg.norm(host.points(flat(at)) - curve(at), axis=1)
+    line = flat(inner)
+    return OnHost(curve2d(flat), line if forward else line[::-1], float(off.max()))
+
+
+def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:
+    """Clamped knots on a stretch, every span of the curve's cut in `split`."""
+    low, high = span
+    slack = 1e-9 * (high - low)
+    breaks = np.unique(knots)
+    breaks = np.concatenate([[low], breaks[(breaks > low + slack) & (breaks < high - slack)], [high]])
+    at = np.arange(split * (len(breaks) - 1) + 1) / split
+    return clamped_knots(np.interp(at, np.arange(len(breaks)), breaks), degree)
+
+
+def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
+    """A plane curve, poles (n, 2), with the same poles and knots in OCCT."""
+    flat = np.zeros((len(curve.poles), 2, 3))
+    flat[:, :, :2] = curve.poles[:, None]
+    flat[:, 1, 2] = 1.0  # an iso-curve of a strip: curves need no array containers of their own
+    strip = to_occt(Surface(flat, curve.knots, _ACROSS, curve.degree, 1))
+    return GeomAPI.To2d_s(strip.VIso(0.0), gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)))
+
+
+def wires_of(face: TopoDS_Face) -> list[TopoDS_Wire]:
+    """The wires of a face, the outer one first."""
+    outer = BRepTools.OuterWire_s(face)
+    found = []
+    explorer = TopExp_Explorer(face, TopAbs_WIRE)
+    while explorer.More():
+        wire = TopoDS.Wire_s(explorer.Current())
+        found.insert(0, wire) if wire.IsSame(outer) else found.append(wire)
+        explorer.Next()
+    return found
+
+
+def segments_of(wire: TopoDS_Wire, face: TopoDS_Face) -> Floats:
+    """(n, 2, 2) straight pieces along a wire in the face's parameters."""
+    pieces = []
+    explorer = TopExp_Explorer(wire, TopAbs_EDGE)
+    while explorer.More():
+        curve = BRepAdaptor_Curve2d(TopoDS.Edge_s(explorer.Current()), face)
+        count = 1 if curve.GetType() == GeomAbs_Line else 8 + 4 * curve.NbKnots() if _is_spline(curve) else 64
+        t = np.linspace(curve.FirstParameter(), curve.LastParameter(), count + 1).tolist()
+        line = np.array([(p.X(), p.Y()) for p in map(curve.Value, t)])
+        pieces.append(np.stack([line[:-1], line[1:]], axis=1))
+        explorer.Next()
+    return np.concatenate(pieces) if pieces else np.empty((0, 2, 2))
+
+
+def _is_spline(curve: BRepAdaptor_Curve2d) -> bool:
+    return curve.GetType().name == "GeomAbs_BSplineCurve"
+
+
+def signed_area(loop: Floats) -> float:
+    """Area within a closed polyline (n, 2), positive counter-clockwise."""
+    x, y = (loop - loop.mean(axis=0)).T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def inside(points: Floats, segments: Floats) -> NDArray[np.bool_]:
+    """Whether points (n, 2) lie within closed lines given as pieces (m, 2, 2): the even-odd rule."""
+    a, b = segments[None, :, 0], segments[None, :, 1]
+    p = points[:, None]
+    straddles = (a[..., 1] > p[..., 1]) != (b[..., 1] > p[..., 1])
+    rise = np.where(straddles, b[..., 1] - a[..., 1], 1.0)
+    x = a[..., 0] + (p[..., 1] - a[..., 1]) / rise * (b[..., 0] - a[..., 0])
+    return np.asarray(np.count_nonzero(straddles & (p[..., 0] < x), axis=1) % 2 == 1)
+
+
+def cross(a: Floats, b: Floats) -> bool:
+    """Whether any straight piece of a (n, 2, 2) meets one of b (m, 2, 2)."""
+    low, high = a.min(axis=(0, 1)), a.max(axis=(0, 1))
+    b = b[((b.max(axis=1) >= low) & (b.min(axis=1) <= high)).all(axis=1)]
+    if not len(b):
+        return False
+    p, r = a[:, None, 0], (a[:, 1] - a[:, 0])[:, None]
+    q, s = b[None, :, 0], (b[:, 1] - b[:, 0])[None]
+    d = q - p
+    det = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
+    safe = np.where(det == 0, np.nan, det)
+    t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / safe
+    u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / safe
+    with np.errstate(invalid="ignore"):
+        return bool(((t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)).any())
+
+
+def surface_on(face: TopoDS_Face) -> HostSurface:
+    """The placed surface under a face."""
+    return HostSurface(BRep_Tool.Surface_s(face))
