@@ -45,7 +45,7 @@ class Settings:
         80, "evaluations allowed for one optimisation; ten times that without gradient"
     )
     tolerance: float = _setting(
-        1e-3, "step that ends an optimisation of the final residual fit, in noise scales"
+        3e-3, "step that ends an optimisation of the final residual fit, in noise scales"
     )
     march_width_change: float = _setting(
         1.5, "largest factor by which the width may change from template to template"
