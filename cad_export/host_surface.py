@@ -1,0 +1,204 @@
+"""The surface under a host face, evaluated at many places at once: points, derivatives, outward normals.
+
+OCP only, no cadquery. Planes and surfaces of revolution that OCCT has by name are evaluated in closed form,
+non-rational B-splines by their poles; all others place by place by BRepAdaptor_Surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.GeomAbs import (
+    GeomAbs_BSplineSurface,
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
+from OCP.gp import gp_Ax3, gp_Pnt, gp_Vec
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopoDS import TopoDS_Face
+
+from cad_export.geometry import from_occt
+
+Floats = NDArray[np.float64]
+Jet = tuple[Floats, ...]
+"""Points and derivatives P, Pu, Pv, Puu, Puv, Pvv, each (..., 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Host:
+    """The surface under a face; u and v may run over its seams and on beyond them."""
+
+    face: TopoDS_Face
+    jet: Callable[[Floats, Floats], Jet]
+    periods: tuple[float, float]
+    """Length of the parameter range along u and v where the surface closes on itself, else 0."""
+    outward: float
+    """1 where the face's outward normal is du x dv, else -1."""
+
+    def points(self, u: Floats, v: Floats) -> Floats:
+        """Points (..., 3)."""
+        return self.jet(u, v)[0]
+
+    def frame(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Points and outward unit normals (..., 3)."""
+        p, pu, pv = self.jet(u, v)[:3]
+        return p, self.normal(pu, pv)
+
+    def normal(self, pu: Floats, pv: Floats) -> Floats:
+        """Outward unit normals for derivatives (..., 3)."""
+        cross = np.cross(pu, pv)
+        length = np.linalg.norm(cross, axis=-1, keepdims=True)
+        return self.outward * cross / np.where(length > 0, length, np.nan)
+
+    def parameters(self, vector: Floats, pu: Floats, pv: Floats) -> Floats:
+        """(..., 2): the rates of u and v at which one moves by `vector` (..., 3), as far as it is tangent."""
+        e, f, g = ((a * b).sum(axis=-1) for a, b in ((pu, pu), (pu, pv), (pv, pv)))
+        a, b = (vector * pu).sum(axis=-1), (vector * pv).sum(axis=-1)
+        det = e * g - f * f
+        return np.stack([a * g - b * f, b * e - a * f], axis=-1) / det[..., None]
+
+    def foot(self, points: Floats, start: Floats) -> Floats:
+        """Parameters (..., 2) of the foot points of points (..., 3), by Newton steps from start (..., 2)."""
+        x = np.array(start, dtype=np.float64)
+        for _ in range(30):
+            p, pu, pv, puu, puv, pvv = self.jet(x[..., 0], x[..., 1])
+            gap = points - p
+            a, b = (gap * pu).sum(axis=-1), (gap * pv).sum(axis=-1)
+            e = (pu * pu - gap * puu).sum(axis=-1)
+            f = (pu * pv - gap * puv).sum(axis=-1)
+            g = (pv * pv - gap * pvv).sum(axis=-1)
+            step = np.stack([a * g - b * f, b * e - a * f], axis=-1) / (e * g - f * f)[..., None]
+            x += step
+            size = np.linalg.norm(step[..., :1] * pu + step[..., 1:] * pv, axis=-1)
+            if not np.max(size) > 1e-13 * (1 + np.abs(p).max()):
+                break
+        return x
+
+
+def host_of(face: TopoDS_Face) -> Host:
+    """The surface under a face, placed by the face's location."""
+    adaptor = BRepAdaptor_Surface(face, False)
+    periods = (
+        float(adaptor.UPeriod()) if adaptor.IsUPeriodic() else 0.0,
+        float(adaptor.VPeriod()) if adaptor.IsVPeriodic() else 0.0,
+    )
+    outward = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
+    return Host(face, _jet(adaptor, periods), periods, outward)
+
+
+def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Callable[[Floats, Floats], Jet]:
+    kind = adaptor.GetType()
+    if kind == GeomAbs_Plane:
+        return _plane(_axes(adaptor.Plane().Position()))
+    if kind == GeomAbs_Cylinder:
+        form = adaptor.Cylinder()
+        radius = form.Radius()
+        return _revolved(
+            _axes(form.Position()), lambda v: (radius + 0 * v, 0 * v, 0 * v, v, 1 + 0 * v, 0 * v)
+        )
+    if kind == GeomAbs_Cone:
+        form = adaptor.Cone()
+        radius, sin, cos = form.RefRadius(), np.sin(form.SemiAngle()), np.cos(form.SemiAngle())
+        return _revolved(
+            _axes(form.Position()),
+            lambda v: (radius + v * sin, sin + 0 * v, 0 * v, v * cos, cos + 0 * v, 0 * v),
+        )
+    if kind in (GeomAbs_Sphere, GeomAbs_Torus):
+        form = adaptor.Sphere() if kind == GeomAbs_Sphere else adaptor.Torus()
+        large = 0.0 if kind == GeomAbs_Sphere else form.MajorRadius()
+        return _revolved(_axes(form.Position()), _circle(large, _small_radius(form)))
+    if kind == GeomAbs_BSplineSurface and not (adaptor.IsURational() or adaptor.IsVRational()):
+        return _spline(adaptor, periods)
+    return _one_by_one(adaptor)
+
+
+def _small_radius(form: Any) -> float:
+    return float(form.MinorRadius() if hasattr(form, "MinorRadius") else form.Radius())
+
+
+def _axes(position: gp_Ax3) -> Floats:
+    """Rows (4, 3): origin, x, y and z of a placement, which may be left-handed."""
+    places = (position.Location(), position.XDirection(), position.YDirection(), position.Direction())
+    return np.array([(a.X(), a.Y(), a.Z()) for a in places])
+
+
+def _plane(axes: Floats) -> Callable[[Floats, Floats], Jet]:
+    def jet(u: Floats, v: Floats) -> Jet:
+        points = axes[0] + u[..., None] * axes[1] + v[..., None] * axes[2]
+        zero = np.zeros_like(points)
+        return points, zero + axes[1], zero + axes[2], zero, zero, zero
+
+    return jet
+
+
+def _circle(large: float, small: float) -> Callable[[Floats], Jet]:
+    def meridian(v: Floats) -> Jet:
+        c, s = small * np.cos(v), small * np.sin(v)
+        return large + c, -s, -c, s, c, -s
+
+    return meridian
+
+
+def _revolved(axes: Floats, meridian: Callable[[Floats], Jet]) -> Callable[[Floats, Floats], Jet]:
+    """r(v) (cos u x + sin u y) + z(v) z, for r, r', r'', z, z', z'' from the meridian."""
+
+    def jet(u: Floats, v: Floats) -> Jet:
+        cos, sin = np.cos(u)[..., None], np.sin(u)[..., None]
+        out, round_ = cos * axes[1] + sin * axes[2], cos * axes[2] - sin * axes[1]
+        r, dr, ddr, z, dz, ddz = (a[..., None] for a in meridian(np.asarray(v)))
+        up = axes[3]
+        return (
+            axes[0] + r * out + z * up,
+            r * round_,
+            dr * out + dz * up,
+            -r * out,
+            dr * round_,
+            ddr * out + ddz * up,
+        )
+
+    return jet
+
+
+def _spline(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Callable[[Floats, Floats], Jet]:
+    surface = from_occt(adaptor.BSpline())
+
+    def jet(u: Floats, v: Floats) -> Jet:
+        at = []
+        for t, period, (low, high) in zip((u, v), periods, surface.domain, strict=True):
+            inside = low + np.mod(t - low, period) if period else t
+            # beyond the border there is no surface; what runs there is refused as off the face
+            at.append(np.clip(inside, low, high))
+        return (surface(at[0], at[1]), *surface.derivatives(at[0], at[1], order=2))
+
+    return jet
+
+
+def _one_by_one(adaptor: BRepAdaptor_Surface) -> Callable[[Floats, Floats], Jet]:
+    (u0, u1, v0, v1) = (
+        adaptor.FirstUParameter(),
+        adaptor.LastUParameter(),
+        adaptor.FirstVParameter(),
+        adaptor.LastVParameter(),
+    )
+    limits = [(-np.inf, np.inf) if adaptor.IsUPeriodic() else (u0, u1)]
+    limits.append((-np.inf, np.inf) if adaptor.IsVPeriodic() else (v0, v1))
+    p, d = gp_Pnt(), [gp_Vec() for _ in range(5)]
+
+    def jet(u: Floats, v: Floats) -> Jet:
+        uu, vv = np.broadcast_arrays(np.clip(u, *limits[0]), np.clip(v, *limits[1]))
+        values = np.empty((uu.size, 6, 3))
+        for i, (a, b) in enumerate(zip(uu.ravel().tolist(), vv.ravel().tolist(), strict=True)):
+            adaptor.D2(a, b, p, *d)
+            values[i] = [(x.X(), x.Y(), x.Z()) for x in (p, *(d[j] for j in (0, 1, 2, 4, 3)))]
+        shaped = values.reshape(*uu.shape, 6, 3)
+        return tuple(shaped[..., j, :] for j in range(6))
+
+    return jet
