@@ -12,9 +12,6 @@ from ridgefeature.bspline import Curve, Surface, clamped_knots, greville
 
 Floats = NDArray[np.float64]
 
-LIFT = 3e-7
-"""A row less than this part of its breadth off the base counts as on it: there edges are shared."""
-
 
 @dataclass(frozen=True, eq=False)
 class Lift:
@@ -31,17 +28,16 @@ class Lift:
     flux: float
 
 
-def lifts(row: Curve, base: Curve) -> list[Lift]:
+def lifts(row: Curve, base: Curve, least: float) -> list[Lift]:
     """The stretches of a ridge's end row that are off the base's row, in ascending order.
 
-    Both rows have the same knots. Where their distance changes its sign a stretch ends and the next begins.
+    Both rows have the same knots. A row is off the base where their distance is `least` or more. Where their distance changes its sign a stretch ends and the next begins.
     """
-    return [_lift(row, base, a, b) for a, b in _stretches(row, base)]
+    return [_lift(row, base, a, b) for a, b in _stretches(row, base, least)]
 
 
-def _stretches(row: Curve, base: Curve) -> list[tuple[float, float]]:
+def _stretches(row: Curve, base: Curve, least: float) -> list[tuple[float, float]]:
     gap = Curve(row.poles - base.poles, row.knots, row.degree)
-    least = LIFT * float(np.ptp(base.poles, axis=0).max())
     if np.abs(gap.poles).max() <= least:
         return []
     breaks = np.unique(row.knots)
@@ -62,10 +58,10 @@ def _stretches(row: Curve, base: Curve) -> list[tuple[float, float]]:
 
 def _edge(gap: Curve, least: float, off: float, on: float) -> float:
     """Where the gap reaches `least` between a parameter where it is smaller and one where it is larger."""
-    for _ in range(30):
-        middle = 0.5 * (off + on)
-        small = float(np.linalg.norm(gap(middle))) < least
-        off, on = (middle, on) if small else (off, middle)
+    for _ in range(4):
+        t = np.linspace(off, on, 65)
+        first = int(np.argmax(np.linalg.norm(gap(t), axis=1) >= least))
+        off, on = float(t[max(first - 1, 0)]), float(t[first])
     return on
 
 

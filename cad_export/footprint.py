@@ -128,7 +128,7 @@ def _local(axes: gp_Ax3, points: Floats) -> Floats:
 class OnHost:
     """A curve's parameter curve on the host, a polyline along it, and how far the curve is off the host."""
 
-    curve: Geom2d_BSplineCurve
+    flat: Curve
     polyline: Floats
     distance: float
 
@@ -154,7 +154,7 @@ def on_host(
     at = np.union1d(inner, 0.5 * (inner[1:] + inner[:-1]))
     off = np.linalg.norm(host.points(flat(at)) - curve(at), axis=1)
     line = flat(inner)
-    return OnHost(curve2d(flat), line if forward else line[::-1], float(off.max()))
+    return OnHost(flat, line if forward else line[::-1], float(off.max()))
 
 
 def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:

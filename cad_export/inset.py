@@ -34,6 +34,7 @@ from cad_export.certificate import Change, certify, subshapes
 from cad_export.end_caps import Lift, lifts
 from cad_export.footprint import (
     HostSurface,
+    OnHost,
     cross,
     curve2d,
     inside,
@@ -49,7 +50,10 @@ from ridgefeature.bspline import Curve, Surface, greville
 Floats = NDArray[np.float64]
 ON_HOST = 1e-4
 """The border may lie off the host's face by this part of its own breadth."""
-_HERE = TopLoc_Location()
+
+
+LIFT = 3e-7
+"""A row less than this part of its breadth off the base counts as on it: there edges are shared."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +172,7 @@ def _build(host: TopoDS_Shape, face: TopoDS_Face, surface: Surface, base: Surfac
     maker = _Maker(surface, base, surface_on(face), face)
     loops = maker.ring() if surface.closed[0] else [maker.open_border()]
     pairs = [maker.hole(loop) for loop in loops]
-    new = [maker.ridge_face(loops), *maker.caps(loops), *_split_face(face, pairs)]
+    new = [maker.ridge_face(loops), *maker.caps(loops), *_split_face(face, maker.own, pairs)]
     solid = _replaced(host, face, new)
     expected = surface.flux() - base.flux() + maker.caps_flux
     return Change(
@@ -189,6 +193,7 @@ class _Maker:
 
     def __init__(self, surface: Surface, base: Surface, host: HostSurface, face: TopoDS_Face) -> None:
         self.surface, self.base, self.host, self.face = surface, base, host, face
+        self.own = [(wire, segments_of(wire, face)) for wire in wires_of(face)]
         self.build = BRep_Builder()
         self.geometry = to_occt(surface)
         self.low_geometry = to_occt(base)
@@ -232,7 +237,10 @@ class _Maker:
         s, b = self.surface, self.base
         u, (v0, v1) = s.domain
         row, low = Curve(s.poles[k], s.knots_v, s.degree_v), Curve(b.poles[k], s.knots_v, s.degree_v)
-        found = lifts(row, low)
+        off = on_host(self.host, low, (v0, v1), None).distance
+        self.check_distance(off)
+        # Edges closer than their tolerances would count as crossing: a cap ends where it is that thin.
+        found = lifts(row, low, max(LIFT * self.breadth, 4 * off))
         breaks = [v0, *(x for lift in found for x in lift.span), v1]
         middle = [
             self.vertex(0.5 * (row(x) + low(x)), float(np.linalg.norm(row(x) - low(x))) + DEGENERATE)
@@ -295,25 +303,41 @@ class _Maker:
 
     def hole(self, pieces: list[_Piece]) -> _Loop:
         """The wire on the host's face that the pieces make; each edge gets its parameter curve there."""
-        where = _HERE.__class__()
+        found = self.on_host(pieces)
+        line = np.concatenate([f.polyline[:-1] for f in found])
+        shift = self.shift(line)
+        where = TopLoc_Location()
         raw = BRep_Tool.Surface_s(self.face, where)
-        lines, at = [], None
-        for piece in pieces:
-            found = on_host(self.host, piece.curve, piece.span, at, piece.forward)
-            self.check_distance(found.distance)
-            edge = piece.on_host
-            self.build.UpdateEdge(edge, found.curve, raw, where, DEGENERATE)
-            self.widen(edge, 1.1 * found.distance + DEGENERATE)
-            lines.append(found.polyline)
-            at = found.polyline[-1]
-        first = lines[0][0]
-        turns = np.abs(at - first) > 0.5 * np.array([p or np.inf for p in self.host.periods])
-        if turns.any():
-            raise SeamError("the border winds round the face")
+        for piece, f in zip(pieces, found, strict=True):
+            flat = curve2d(replace(f.flat, poles=f.flat.poles + shift))
+            self.build.UpdateEdge(piece.on_host, flat, raw, where, DEGENERATE)
+            self.widen(piece.on_host, 1.1 * f.distance + DEGENERATE)
         flip = self.face.Orientation() == TopAbs_REVERSED
         edges = [_oriented(p.on_host, p.forward == flip) for p in pieces]
-        polyline = np.concatenate([line[:-1] for line in lines])
-        return _Loop(self.wire(edges if flip else edges[::-1]), polyline if flip else polyline[::-1])
+        line = line + shift
+        return _Loop(self.wire(edges if flip else edges[::-1]), line if flip else line[::-1])
+
+    def on_host(self, pieces: list[_Piece]) -> list[OnHost]:
+        """The pieces in the host's parameters, each going on where the one before it ends."""
+        found: list[OnHost] = []
+        for piece in pieces:
+            at = found[-1].polyline[-1] if found else None
+            found.append(on_host(self.host, piece.curve, piece.span, at, piece.forward))
+            self.check_distance(found[-1].distance)
+        gap = np.abs(found[-1].polyline[-1] - found[0].polyline[0])
+        if any(p and g > 0.5 * p for p, g in zip(self.host.periods, gap, strict=True)):
+            raise SeamError("surface: expected a border that closes on the face, it winds round it")
+        return found
+
+    def shift(self, line: Floats) -> Floats:
+        """Whole periods by which a loop is moved to lie among the face's own parameters."""
+        if not any(self.host.periods):
+            return np.zeros(2)
+        own = np.concatenate([segments for _, segments in self.own])
+        middle = 0.5 * (own.min(axis=(0, 1)) + own.max(axis=(0, 1)))
+        centre = 0.5 * (line.min(axis=0) + line.max(axis=0))
+        period = np.array(self.host.periods)
+        return period * np.round((middle - centre) / np.where(period > 0, period, np.inf))
 
     def check_distance(self, distance: float) -> None:
         if not distance <= ON_HOST * self.breadth:
@@ -351,7 +375,9 @@ def _oriented(edge: TopoDS_Edge, forward: bool) -> TopoDS_Edge:
     return TopoDS.Edge_s(edge.Oriented(TopAbs_FORWARD if forward else TopAbs_REVERSED))
 
 
-def _split_face(face: TopoDS_Face, loops: list[_Loop]) -> list[TopoDS_Face]:
+def _split_face(
+    face: TopoDS_Face, own: list[tuple[TopoDS_Wire, Floats]], loops: list[_Loop]
+) -> list[TopoDS_Face]:
     """The face with the outer loop as a hole; with two loops also the island within the inner one."""
     areas = [signed_area(loop.polyline) for loop in loops]
     outer = int(np.argmax(np.abs(areas)))
@@ -359,11 +385,10 @@ def _split_face(face: TopoDS_Face, loops: list[_Loop]) -> list[TopoDS_Face]:
         raise ValueError(
             "surface: expected du x dv away from the host's material, it points inwards; turn the surface round"
         )
-    periods = surface_on(face).periods
-    own = [(wire, segments_of(wire, face)) for wire in wires_of(face)]
     everything = np.concatenate([segments for _, segments in own])
-    shifted = [_shifted(loop, loops[outer], everything, periods) for loop in loops]
-    lines = [np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in shifted]
+    lines = [
+        np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in (loop.polyline for loop in loops)
+    ]
     around = np.concatenate(lines)
     island = []
     for k, (wire, segments) in enumerate(own):
@@ -379,26 +404,13 @@ def _split_face(face: TopoDS_Face, loops: list[_Loop]) -> list[TopoDS_Face]:
                     "surface: expected a footprint clear of holes and earlier ridges, it covers one; move the path"
                 )
             island.append(wire)
-    if not inside(shifted[outer][:1], everything)[0]:
+    if not inside(loops[outer].polyline[:1], everything)[0]:
         raise ValueError("surface: expected a border within the face, it lies outside; move the path")
     kept = [wire for wire, _ in own if not any(wire.IsSame(other) for other in island)]
     faces = [_face_like(face, [*kept, loops[outer].wire])]
     if len(loops) == 2:
         faces.append(_face_like(face, [loops[1 - outer].wire, *island]))
     return faces
-
-
-def _shifted(loop: _Loop, outer: _Loop, segments: Floats, periods: tuple[float, float]) -> Floats:
-    """The loop's polyline moved by whole periods towards the face's own parameters."""
-    low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
-    centre = 0.5 * (outer.polyline.min(axis=0) + outer.polyline.max(axis=0))
-    shift = np.array(
-        [
-            p * np.round((m - c) / p) if p else 0.0
-            for p, m, c in zip(periods, 0.5 * (low + high), centre, strict=True)
-        ]
-    )
-    return loop.polyline + shift
 
 
 def _face_like(face: TopoDS_Face, wires: list[TopoDS_Wire]) -> TopoDS_Face:
