@@ -9,19 +9,41 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cad_export.carried import attach, carried_by
+    from cad_export.formats import write
     from cad_export.geometry import surface_of
+    from cad_export.loading import carried_in, load
+    from cad_export.record import Carried
     from cad_export.shapes import face, solid
     from cad_export.step_file import read_step, step
 
-__all__ = ["face", "read_step", "solid", "step", "surface_of"]
+__all__ = [
+    "Carried",
+    "attach",
+    "carried_by",
+    "carried_in",
+    "face",
+    "load",
+    "read_step",
+    "solid",
+    "step",
+    "surface_of",
+    "write",
+]
 
 # A module must not bear the name of a function here: importing it would replace the function.
 _HOME = {
+    "Carried": "record",
+    "attach": "carried",
+    "carried_by": "carried",
+    "carried_in": "loading",
     "face": "shapes",
+    "load": "loading",
     "read_step": "step_file",
     "solid": "shapes",
     "step": "step_file",
     "surface_of": "geometry",
+    "write": "formats",
 }
 
 

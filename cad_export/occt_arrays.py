@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from OCP.Geom import Geom_BSplineSurface
 from OCP.gp import gp_Pnt
+from OCP.StepRepr import StepRepr_HArray1OfRepresentationItem, StepRepr_RepresentationItem
 from OCP.TColgp import TColgp_Array2OfPnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
+from OCP.TDF import TDF_LabelSequence
+from OCP.TopTools import TopTools_IndexedMapOfShape
 
 Floats = NDArray[np.float64]
 
@@ -35,3 +41,30 @@ def integers(values: NDArray[np.integer]) -> TColStd_Array1OfInteger:
     for i, x in enumerate(values.tolist(), 1):
         array.SetValue(i, x)
     return array
+
+
+def pole_array(geometry: Geom_BSplineSurface) -> Floats:
+    """The poles (nu, nv, 3) of an OCCT surface."""
+    g = geometry
+    points = [[g.Pole(i, j) for j in range(1, g.NbVPoles() + 1)] for i in range(1, g.NbUPoles() + 1)]
+    return np.array([[(p.X(), p.Y(), p.Z()) for p in row] for row in points])
+
+
+def representation_items(
+    items: Sequence[StepRepr_RepresentationItem],
+) -> StepRepr_HArray1OfRepresentationItem:
+    """STEP entities as an OCCT array, indices from 1."""
+    array = StepRepr_HArray1OfRepresentationItem(1, len(items))
+    for i, item in enumerate(items, 1):
+        array.SetValue(i, item)
+    return array
+
+
+def shape_map() -> TopTools_IndexedMapOfShape:
+    """An empty map of shapes, which keeps the order they come in."""
+    return TopTools_IndexedMapOfShape()
+
+
+def label_sequence() -> TDF_LabelSequence:
+    """An empty sequence of labels of an OCAF document."""
+    return TDF_LabelSequence()

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import cadquery as cq
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.Geom import Geom_BSplineSurface
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
+from cad_export.carried import attach, faces_of
 from cad_export.geometry import RidgeLike, make_face, surface_for
+from cad_export.occt_arrays import pole_array
+from cad_export.record import record_of
 from cad_export.slab import make_slab
 from ridgefeature.bspline import Surface
 
@@ -13,9 +20,11 @@ def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1) -> cq.Face:
     """One face with the exact poles and knots of ridge.resized(h=h, w=w).surface(), or of a Surface.
 
     In the frame and unit of the ridge; natural bounds; its normal is du x dv. Raises ValueError for anything
-    that is neither, and for rates of a plain Surface.
+    that is neither, and for rates of a plain Surface. The face carries the feature (`carried_by`).
     """
-    return cq.Face(make_face(surface_for(ridge, h, w)))
+    made = make_face(surface_for(ridge, h, w))
+    attach(made, record_of(ridge, h, w))
+    return cq.Face(made)
 
 
 def solid(
@@ -27,8 +36,21 @@ def solid(
     and does not change with h. Lengths in the ridge's unit, thickness > 0 and more than a groove is deep.
     Checked before it is returned: one closed valid solid, of the volume that its faces enclose, no faces that
     cross each other. That last search takes most of the time, up to seconds for long ridges; check=False
-    leaves it out. Raises ValueError when a check fails.
+    leaves it out. The solid carries the feature (`carried_by`). Raises ValueError when a check fails.
     """
     top = surface_for(ridge, h, w)
     base = top if isinstance(ridge, Surface) else surface_for(ridge, 0, w)
-    return cq.Solid(make_slab(top, base, thickness, check))
+    made = make_slab(top, base, thickness, check)
+    attach(_face_on(made, top), record_of(ridge, h, w))
+    return cq.Solid(made)
+
+
+def _face_on(shape: TopoDS_Shape, surface: Surface) -> TopoDS_Face:
+    """The face of a shape with exactly this surface's poles."""
+    for face in faces_of(shape):
+        geometry = BRep_Tool.Surface_s(face)
+        if isinstance(geometry, Geom_BSplineSurface):
+            poles = pole_array(geometry)
+            if poles.shape == surface.poles.shape and np.array_equal(poles, surface.poles):
+                return face
+    raise ValueError("expected the surface's own face in the solid, sewing has changed it; thicken the solid")

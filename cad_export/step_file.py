@@ -1,26 +1,32 @@
-"""STEP files, in millimetres. OCP only: without cadquery a command line starts twice as fast."""
+"""STEP files that carry their ridge features, in millimetres.
+
+OCP only: without cadquery a command line starts twice as fast.
+"""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
-from OCP.BRep import BRep_Builder
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.Interface import Interface_Static
-from OCP.Message import Message
-from OCP.StepBasic import StepBasic_Product
-from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Reader, STEPControl_Writer
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader
+from OCP.StepShape import StepShape_FaceSurface
 from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
+from cad_export.carried import attach, carried_by, faces_of
 from cad_export.geometry import RidgeLike, make_face, surface_for, topods
+from cad_export.occt_session import quiet
+from cad_export.record import Carried, record_of
+from cad_export.step_model import add_property, ascii_name, document, name_faces, name_products, named
+from cad_export.step_properties import items, records_in
 from ridgefeature.bspline import Surface
 
 SCHEMAS = {
@@ -32,8 +38,6 @@ SCHEMAS = {
 }
 """Names that `step` takes, and OCCT's name for each."""
 
-_LOCK = threading.Lock()  # OCCT's settings are global
-
 
 def step(
     ridge_or_shape: Any, path: str | os.PathLike[str], schema: str = "AP242DIS", h: float = 1, w: float = 1
@@ -42,6 +46,8 @@ def step(
 
     Takes a Ridge: its exact face at rates h and w, scaled from its unit to millimetres. Or, in millimetres,
     a Surface, a cq.Shape, a Workplane, an Assembly or anything whose `.wrapped` is a TopoDS_Shape.
+    Products bear the file's name; ridge faces are named "ridge", "ridge 2", ... and coloured. Every feature
+    that the shape carries (`carried_by`) goes with it as a user property, for `load` to get back.
     The schema is one of SCHEMAS. OCCT writes 13 digits. The file is written beside the path and renamed, so
     it is never half there.
     Raises ValueError for an unknown schema or suffix or something that is no shape, OSError when the file
@@ -52,7 +58,7 @@ def step(
         raise ValueError(f"expected a file name that ends in .step or .stp, got {target.name!r}; rename it")
     if not isinstance(schema, str) or schema.upper() not in SCHEMAS:
         raise ValueError(f"expected a schema of {', '.join(SCHEMAS)}, got {schema!r}; choose one")
-    shape = _shape_in_mm(ridge_or_shape, h, w)
+    shape = shape_in_mm(ridge_or_shape, h, w)
     if not target.parent.is_dir():
         raise FileNotFoundError(f"expected a folder to write to, got {str(target.parent)!r}; create it first")
     beside = target.with_name(f".{target.stem}.{os.getpid()}-{threading.get_ident()}.step")
@@ -66,29 +72,49 @@ def step(
 
 
 def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
-    """The shape in a STEP file, in millimetres; several are one compound.
+    """The shape in a STEP file, in millimetres; several are one compound. Its faces carry their features.
 
-    Raises OSError when the file cannot be read, ValueError when it holds no shape.
+    Raises OSError when the file cannot be read; ValueError when it is cut off, holds no shape, or when a
+    feature in it is damaged.
     """
     source = Path(path)
-    with source.open("rb"):
-        pass
-    with _quiet({"xstep.cascade.unit": "MM"}):
+    records = {record.name: record for record in records_in(source)}
+    with quiet({"xstep.cascade.unit": "MM"}):
         reader = STEPControl_Reader()
-        if reader.ReadFile(str(source)) != IFSelect_RetDone:
+        if reader.ReadFile(str(source)) != IFSelect_RetDone:  # going on would crash the process
             raise ValueError(f"expected a STEP file, OCCT cannot read {source.name!r}; export it again")
         reader.TransferRoots()
         shape = reader.OneShape()
     if shape.IsNull():
         raise ValueError(f"expected a shape in the STEP file, got none in {source.name!r}; export it again")
+    _attach_by_name(shape, records, reader.WS().TransferReader())
     return shape
 
 
-def _shape_in_mm(source: Any, h: float, w: float) -> TopoDS_Shape:
+def _attach_by_name(shape: TopoDS_Shape, records: dict[str, Carried], transfer: Any) -> None:
+    """Give faces their records back: the name is that of the STEP entity that a face came from."""
+    done = []
+    for face in faces_of(shape) if records else []:
+        entity = transfer.EntityFromShapeResult(face, 1)
+        if entity is None:  # of an instance, which is known where its part is
+            entity = transfer.EntityFromShapeResult(face.Located(TopLoc_Location()), 1)
+        if not isinstance(entity, StepShape_FaceSurface) or entity.Name() is None:
+            continue
+        record, surface = records.get(entity.Name().ToCString()), BRep_Tool.Surface_s(face, TopLoc_Location())
+        # the first of several instances: the others follow by their locations
+        if record is not None and not any(surface is other for other in done):
+            attach(face, record)
+            done.append(surface)
+
+
+def shape_in_mm(source: Any, h: float = 1, w: float = 1) -> TopoDS_Shape:
+    """The shape of anything that `step` takes, in millimetres; a Ridge's face carries its feature."""
     if isinstance(source, (Surface, RidgeLike)):
         surface = surface_for(source, h, w)
         factor = _mm(getattr(source, "unit", "mm"))
-        return make_face(surface if factor == 1 else replace(surface, poles=surface.poles * factor))
+        face = make_face(surface if factor == 1 else replace(surface, poles=surface.poles * factor))
+        attach(face, record_of(source, h, w))
+        return face
     if h != 1 or w != 1:
         raise ValueError(
             f"expected a Ridge for rates h={h:g}, w={w:g}, got {type(source).__name__}; leave both 1"
@@ -114,53 +140,28 @@ def _compound(shapes: list[TopoDS_Shape]) -> TopoDS_Shape:
 
 
 def _write(shape: TopoDS_Shape, path: Path, schema: str, name: str) -> None:
-    text = name.encode("ascii", "replace").decode()  # OCCT writes names as they are
+    text = ascii_name(name)
+    features = named(carried_by(shape))
     settings = {"write.step.schema": schema, "write.step.unit": "MM", "xstep.cascade.unit": "MM"}
-    with _quiet(settings):
-        writer = STEPControl_Writer()
-        if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
+    with quiet(settings):
+        writer = STEPCAFControl_Writer()
+        if not writer.Transfer(document(shape, text), STEPControl_AsIs):
             raise ValueError(
                 "expected a shape that STEP can hold, OCCT cannot translate it; check that it is valid"
             )
-        model = writer.Model()
-        _name_products(model, text)
+        inner = writer.ChangeWriter()
+        model = inner.Model()
+        name_products(model, text)
+        name_faces(inner.WS().TransferWriter().FinderProcess(), features)
+        # faces of one feature, which was cut in two, have one record
+        records = list({record.name: record for _, record in features}.values())
+        if records:
+            add_property(model, items(records))
         header = APIHeaderSection_MakeHeader(model)
         header.SetName(TCollection_HAsciiString(text))
         header.SetOriginatingSystem(TCollection_HAsciiString("ridgefeature"))
         if writer.Write(str(path)) != IFSelect_RetDone:
             raise OSError(f"OCCT could not write {path.name!r}; check the space left on the disk")
-
-
-def _name_products(model: Any, name: str) -> None:
-    """Name the products after the file: OCCT numbers them through the session, so no two files are alike."""
-    entities = (model.Value(i) for i in range(1, model.NbEntities() + 1))
-    products = [entity for entity in entities if isinstance(entity, StepBasic_Product)]
-    for n, product in enumerate(products, 1):
-        text = TCollection_HAsciiString(name if len(products) == 1 else f"{name} {n}")
-        product.SetId(text)
-        product.SetName(text)
-
-
-@contextmanager
-def _quiet(settings: dict[str, str]) -> Iterator[None]:
-    """OCCT with these settings and without its chatter; both as they were afterwards."""
-    with _LOCK:
-        STEPControl_Controller.Init_s()  # defines the settings
-        before = {key: Interface_Static.CVal_s(key) for key in settings}
-        messenger = Message.DefaultMessenger_s()
-        printers = list(messenger.Printers())
-        try:
-            for printer in printers:
-                messenger.RemovePrinter(printer)
-            for key, value in settings.items():
-                if not Interface_Static.SetCVal_s(key, value):
-                    raise ValueError(f"OCCT does not take {value!r} for {key}")
-            yield
-        finally:
-            for key, value in before.items():
-                Interface_Static.SetCVal_s(key, value)
-            for printer in printers:
-                messenger.AddPrinter(printer)
 
 
 def _mm(unit: str) -> float:

@@ -152,7 +152,7 @@ def test_occts_globals_are_restored(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     printers = Message.DefaultMessenger_s().Printers().Size()
     try:
         if fails:
-            monkeypatch.setattr("cad_export.step_file.STEPControl_Writer", lambda: 1 / 0)
+            monkeypatch.setattr("cad_export.step_file.STEPCAFControl_Writer", lambda: 1 / 0)
             with pytest.raises(ZeroDivisionError):
                 cx.step(patch(), tmp_path / "a.step", schema="AP203")
         else:
