@@ -350,19 +350,52 @@ result = state()
 document = FreeCAD.openDocument(path)
 ridge = document.getObject("Ridge")
 result = {"asleep": state(), "proxy": ridge.Proxy is None}
+document.UndoMode = 1
 run()
-result["awake"] = state()
+result["awake"], result["undo"] = state(), document.UndoNames
 ridge.Height = 2
 document.recompute()
 result["taller"] = state()
+FreeCAD.closeDocument(document.Name)
+document = FreeCAD.openDocument(path)
+ridge = document.getObject("Ridge")
+ridge.Height = 2
+document.recompute()
+run()
+result["changed asleep"] = state()
 """
     found = run_freecad(OPEN + again, macro=str(macro), path=path)
-    assert found["proxy"]
+    assert found["proxy"] and found["undo"] == []
     for state in (found["asleep"], found["awake"]):
         assert state["names"] == ["Ridge"] and state["rates"] == [1.7, 0.9] and state["valid"]
         np.testing.assert_allclose(state["poles"], saved["poles"], rtol=0, atol=1e-12 * 50)
     wanted = ridge.resized(h=2, w=0.9).surface().poles
-    np.testing.assert_allclose(found["taller"]["poles"], wanted, rtol=0, atol=1e-12 * 50)
+    for name in ("taller", "changed asleep"):
+        np.testing.assert_allclose(found[name]["poles"], wanted, rtol=0, atol=1e-12 * 50)
+
+
+@needs_freecad
+def test_adding_a_ridge_is_one_step_to_undo(macro):
+    script = """
+document = FreeCAD.newDocument("Part")
+document.UndoMode = 1
+box = document.addObject("Part::Box", "Box")
+run()
+names = lambda: [one.Name for one in document.Objects]
+result = {"added": names(), "steps": document.UndoNames}
+document.undo()
+result["undone"] = names()
+document.redo()
+ridge = document.getObject("Ridge")
+result["redone"], area = names(), ridge.Shape.Area
+ridge.Height = 3
+document.recompute()
+result["grown"] = ridge.Shape.Area / area
+"""
+    found = run_freecad(OPEN + script, macro=str(macro))
+    assert found["added"] == found["redone"] == ["Box", "Ridge"]
+    assert found["steps"][0] == "Add ridge" and found["undone"] == ["Box"]
+    assert found["grown"] > 1.2
 
 
 @needs_freecad
