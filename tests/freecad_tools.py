@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import tempfile
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +41,13 @@ with open({out!r}, "w") as file:
 """
 
 
-def run_freecad(script: str, timeout: float = 120, **given: Any) -> dict[str, Any]:
+def run_freecad(
+    script: str, files: Sequence[Path] = (), timeout: float = 120, **given: Any
+) -> dict[str, Any]:
     """Run Python source in FreeCAD without a screen; return what it leaves in `result`, through JSON.
 
-    `given` are variables that the script finds, anything that JSON holds. Raises RuntimeError with the
+    `files` are documents and macros that FreeCAD opens and runs first, as on its command line. `given` are
+    variables that the script finds, anything that JSON holds. Raises RuntimeError with the
     traceback or the output where the script fails or FreeCAD dies, subprocess.TimeoutExpired after `timeout`
     seconds.
     """
@@ -57,7 +60,7 @@ def run_freecad(script: str, timeout: float = 120, **given: Any) -> dict[str, An
         # FreeCAD looks for a virtual environment's own files, and writes its settings to the home folder
         environment = {k: v for k, v in os.environ.items() if k not in ("VIRTUAL_ENV", "PYTHONPATH")}
         done = subprocess.run(
-            [FREECAD, str(runner)],
+            [FREECAD, *map(str, files), str(runner)],
             env={**environment, "HOME": folder},
             stdin=subprocess.DEVNULL,
             capture_output=True,

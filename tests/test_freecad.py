@@ -375,6 +375,24 @@ result["changed asleep"] = state()
 
 
 @needs_freecad
+def test_the_macro_runs_from_the_command_line(ridge, macro, tmp_path):
+    path = tmp_path / "part.FCStd"
+    look = """
+document = FreeCAD.ActiveDocument
+ridge = document.getObject("Ridge")
+result = {**state(), "awake": ridge.Proxy is not None}
+document.saveAs(path)
+"""
+    other = write_macro(ridge.resized(h=2), tmp_path / "other.FCMacro")
+    first = run_freecad(OPEN + look, files=[macro], path=str(path))
+    again = run_freecad(OPEN + look, files=[path, macro], path=str(path))
+    two = run_freecad(OPEN + look, files=[path, other], path=str(path))
+    assert first["awake"] and again["awake"] and two["awake"]
+    assert first["names"] == again["names"] == ["Ridge"]
+    assert two["names"] == ["Ridge", "Ridge001"]
+
+
+@needs_freecad
 def test_adding_a_ridge_is_one_step_to_undo(macro):
     script = """
 document = FreeCAD.newDocument("Part")
