@@ -11,7 +11,7 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
-from cad_export.face_path import FacePath, developed_path, follow, moved, nearest, projected_path
+from cad_export.face_path import FacePath, developed_path, follow, nearest, projected_path, settled
 from cad_export.geometry import topods
 from cad_export.host_surface import Host, host_of
 from cad_export.strip import check_strip, inner_point, longer_direction
@@ -25,7 +25,6 @@ Floats = NDArray[np.float64]
 NEAR = 0.25
 """How far a path or `at` may lie from the face, in widths."""
 _DEGREE = 16
-_CLOSE = 1e-8
 _KEPT = 8
 
 
@@ -109,11 +108,11 @@ class FaceBase:
         nodes = np.sin(0.5 * np.pi * np.arange(half + 1) / half)  # Chebyshev points, from 0 to 1
         steps = np.diff(nodes)[:, None] * np.tile(reach, 2)
         parts, before = 1, None
-        for _ in range(7):
+        for round_ in range(7):
             fine = np.repeat(steps / parts, parts, axis=0)
             with np.errstate(all="ignore"):
                 both = follow(self.host, start, rates, fine)[0][::parts]
-                if before is not None and moved(self.host, both, before) <= 15 * _CLOSE * reach.min():
+                if settled(self.host, both, before, float(reach.min()), round_):
                     break
             before, parts = both, 2 * parts
         if not np.isfinite(both).all():

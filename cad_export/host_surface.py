@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face
 
 from cad_export.geometry import from_occt
+from ridgefeature.bspline import Surface
 
 Floats = NDArray[np.float64]
 Jet = tuple[Floats, ...]
@@ -168,17 +170,54 @@ def _revolved(axes: Floats, meridian: Callable[[Floats], Jet]) -> Callable[[Floa
 
 
 def _spline(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Callable[[Floats, Floats], Jet]:
+    """By the coefficients of every patch in powers: quicker than basis functions for few places at a time."""
     surface = from_occt(adaptor.BSpline())
+    breaks, coefficients = _patches(surface)
+    orders = tuple(np.arange(c) for c in coefficients.shape[2:4])
 
     def jet(u: Floats, v: Floats) -> Jet:
-        at = []
-        for t, period, (low, high) in zip((u, v), periods, surface.domain, strict=True):
-            inside = low + np.mod(t - low, period) if period else t
+        u, v = np.broadcast_arrays(u, v)
+        spans, powers = [], []
+        for t, period, edges, order in zip((u, v), periods, breaks, orders, strict=True):
+            inside = edges[0] + np.mod(t - edges[0], period) if period else t
             # beyond the border there is no surface; what runs there is refused as off the face
-            at.append(np.clip(inside, low, high))
-        return (surface(at[0], at[1]), *surface.derivatives(at[0], at[1], order=2))
+            inside = np.clip(inside, edges[0], edges[-1])
+            span = np.clip(np.searchsorted(edges, inside, side="right") - 1, 0, len(edges) - 2)
+            spans.append(span)
+            powers.append(_powers(inside - edges[span], order))
+        near = coefficients[spans[0], spans[1]]
+        rows = np.einsum("...dj,...ijx->...dix", powers[1], near)  # by derivatives of v
+        along = powers[0]
+        pairs = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+        return tuple(np.einsum("...i,...ix->...x", along[..., a, :], rows[..., b, :, :]) for a, b in pairs)
 
     return jet
+
+
+def _powers(t: Floats, order: NDArray[np.intp]) -> Floats:
+    """(..., 3, n): 1, t, t^2, ... and their first two derivatives."""
+    plain = t[..., None] ** order
+    first = np.zeros_like(plain)
+    first[..., 1:] = plain[..., :-1] * order[1:]
+    second = np.zeros_like(plain)
+    second[..., 1:] = first[..., :-1] * order[1:]
+    return np.stack([plain, first, second], axis=-2)
+
+
+def _patches(surface: Surface) -> tuple[tuple[Floats, Floats], Floats]:
+    """Breaks along u and v, and coefficients (m, n, degree_u + 1, degree_v + 1, 3) of powers from each."""
+    breaks = tuple(
+        np.unique(knots[degree : len(knots) - degree])
+        for knots, degree in ((surface.knots_u, surface.degree_u), (surface.knots_v, surface.degree_v))
+    )
+    terms = [
+        [
+            surface.on_grid(breaks[0][:-1], breaks[1][:-1], (i, j)) / (factorial(i) * factorial(j))
+            for j in range(surface.degree_v + 1)
+        ]
+        for i in range(surface.degree_u + 1)
+    ]
+    return (breaks[0], breaks[1]), np.ascontiguousarray(np.array(terms).transpose(2, 3, 0, 1, 4))
 
 
 def _one_by_one(adaptor: BRepAdaptor_Surface) -> Callable[[Floats, Floats], Jet]:

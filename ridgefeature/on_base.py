@@ -186,7 +186,8 @@ def _octave(breadth: float) -> float:
 def _columns(base: Base, s: Array, border: Array, section: Section, flank: float) -> tuple[Array, float]:
     """Knots across and the breadth of the flanks' spans: the flat ridge's where they do, or finer ones.
 
-    Finer ones are cut evenly on each flank and between the feet, and looked at for both ends of the octave.
+    Finer ones are cut evenly on each flank and between the feet, and looked at for both ends of the octave,
+    with room for a width that varies along.
     """
     chosen = np.unique(np.linspace(0, len(s) - 1, min(len(s), 33)).round().astype(np.intp))
     s, border = s[chosen], border[chosen]
@@ -199,7 +200,7 @@ def _columns(base: Base, s: Array, border: Array, section: Section, flank: float
     ):
         return plain, OUTSIDE
     breaks = np.unique(section_knots(section, flank))
-    widths = [np.minimum(border / (0.5 + flank * x), widest) for x in (0.5**0.5, 2**0.5)]
+    widths = [np.minimum(border / (0.5 + flank * x), widest) for x in (0.5**0.5, 1.7)]
     parts = np.ones(3, dtype=np.intp)  # left flank, ridge, right flank
     for _ in range(8):
         knots = _cut(breaks, parts)
