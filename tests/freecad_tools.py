@@ -85,20 +85,31 @@ result = {
     "own_volume": shape.Volume if shape.Solids else 0.0, "triangles": triangles,
     "mesh_volume": sum(points[a].dot(points[b].cross(points[c])) for a, b, c in triangles) / 6,
 }
+if check:
+    try:
+        shape.check(True)
+        result["faults"] = ""
+    except ValueError as faults:
+        result["faults"] = str(faults) or "unnamed"
 """
 
 
-def inspect_step(path: str | os.PathLike[str], deflection: float = 3e-4) -> dict[str, Any]:
+def inspect_step(
+    path: str | os.PathLike[str], deflection: float = 3e-4, check: bool = False
+) -> dict[str, Any]:
     """What FreeCAD finds in a STEP file. Lengths in millimetres.
 
     solids, faces: counts; valid: isValid() of the whole; closed_mesh: whether every edge of its mesh is
     shared by two triangles; mesh_volume: the volume that the mesh encloses, `deflection` as a part of the
     shape's diagonal; own_volume: FreeCAD's Volume, which may be several per cent off on long spline faces;
     volume: that of the shape as FreeCAD read it, integrated to a tolerance (0 without a solid).
+    With `check` also faults: what FreeCAD's Check geometry with its search for crossing faces reports, "" for
+    nothing; it takes seconds. A deflection below 1e-4 may take gigabytes on long ridges.
     """
     with tempfile.TemporaryDirectory() as folder:
         brep = Path(folder, "read.brep")
-        found = run_freecad(_INSPECT, path=str(Path(path).resolve()), brep=str(brep), deflection=deflection)
+        where = {"path": str(Path(path).resolve()), "brep": str(brep)}
+        found = run_freecad(_INSPECT, **where, deflection=deflection, check=check)
         found["volume"] = brep_volume(brep) if found["solids"] else 0.0
     found["closed_mesh"] = closed(found.pop("triangles"))
     return found
