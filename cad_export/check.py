@@ -44,14 +44,14 @@ def check_solid(shape: TopoDS_Shape, expected_volume: float, crossings: bool = T
         raise ValueError(
             f"expected a solid of volume {expected_volume:.6g}, got {got:.6g}; it turns inside out somewhere"
         )
-    faults = [fault for fault in BRepAlgoAPI_Check(shape, True, crossings).Result() if not _is_seam(fault)]
+    faults = [fault for fault in BRepAlgoAPI_Check(shape, True, crossings).Result() if not is_seam(fault)]
     if faults:
         raise ValueError(
             "expected a solid without self-intersections; use a thinner one or a shorter stretch"
         )
 
 
-def _is_seam(fault: BOPAlgo_CheckResult) -> bool:
+def is_seam(fault: BOPAlgo_CheckResult) -> bool:
     """Whether OCCT merely takes the seam of one closed face for a self-intersection, as it always does."""
     shapes = [*fault.GetFaultyShapes1(), *fault.GetFaultyShapes2()]
     if (

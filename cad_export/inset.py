@@ -107,10 +107,15 @@ def inset(
     start = time.perf_counter()
     placed = _face_of(host, face)
     _check_pair(surface, base)
+    _check_folds(surface, base)
     change = _build(host, placed, surface, base)
-    largest = certify(change, crossings=check)
+    certify(change, thorough=check)
     return change.solid, InsetReport(
-        "inset", change.volume_added, change.volume_expected, largest, time.perf_counter() - start
+        "inset",
+        change.volume_added,
+        change.volume_expected,
+        change.largest_tolerance,
+        time.perf_counter() - start,
     )
 
 
@@ -168,16 +173,49 @@ def _check_pair(surface: Surface, base: Surface) -> None:
         )
 
 
+def _check_folds(surface: Surface, base: Surface) -> None:
+    """Raise ValueError where the surface turns over above its base: its normal points below it."""
+    (u0, u1), (v0, v1) = surface.domain
+    u = np.linspace(u0, u1, 2 * surface.poles.shape[0] + 1)
+    v = np.linspace(v0, v1, 2 * surface.poles.shape[1] + 1)
+    cross_above, cross_below = (
+        np.cross(s.on_grid(u, v, (1, 0)), s.on_grid(u, v, (0, 1))) for s in (surface, base)
+    )
+    if not (np.einsum("mkd,mkd->mk", cross_above, cross_below) > 0).all():
+        raise ValueError(
+            "surface: expected one that does not fold over itself, it does; use a lower height or a path with "
+            "wider bends"
+        )
+
+
+def _check_loops(loops: list[_Loop]) -> None:
+    """Raise ValueError where the border crosses itself."""
+    line = np.concatenate([_pieces_of(loop.polyline[:: 1 + len(loop.polyline) // 300]) for loop in loops])
+    n = len(line)
+    for k in range(0, n, 64):
+        some = np.arange(k, min(k + 64, n))
+        others = line[(np.arange(n) < k - 1) | (np.arange(n) > some[-1] + 1)]
+        if k == 0:
+            others = others[:-1]
+        elif some[-1] == n - 1:
+            others = others[1:]
+        if cross(line[some], others):
+            raise ValueError("surface: expected a border that does not cross itself, it does; move the path")
+
+
+def _pieces_of(line: Floats) -> Floats:
+    return np.stack([line, np.roll(line, -1, axis=0)], axis=1)
+
+
 def _build(host: TopoDS_Shape, face: TopoDS_Face, surface: Surface, base: Surface) -> Change:
     maker = _Maker(surface, base, surface_on(face), face)
     loops = maker.ring() if surface.closed[0] else [maker.open_border()]
     pairs = [maker.hole(loop) for loop in loops]
+    _check_loops(pairs)
     new = [maker.ridge_face(loops), *maker.caps(loops), *_split_face(face, maker.own, pairs)]
     solid = _replaced(host, face, new)
     expected = surface.flux() - base.flux() + maker.caps_flux
-    return Change(
-        host, face, solid, tuple(new), expected, float(np.ptp(base.poles, axis=(0, 1)).max()), surface, base
-    )
+    return Change(host, face, solid, tuple(new), base, expected)
 
 
 @dataclass(frozen=True)
@@ -396,12 +434,14 @@ def _split_face(
             raise ValueError(
                 "surface: expected a border within the face, it leaves the face's outline; move the path"
                 if k == 0
-                else "surface: expected a border clear of holes and earlier ridges, it overlaps one; move the path"
+                else "surface: expected a border clear of holes and earlier ridges, "
+                "it overlaps one; move the path"
             )
         if k and inside(segments[:1, 0], lines[outer])[0]:
             if len(loops) == 1 or inside(segments[:1, 0], around)[0]:
                 raise ValueError(
-                    "surface: expected a footprint clear of holes and earlier ridges, it covers one; move the path"
+                    "surface: expected a footprint clear of holes and earlier ridges, it covers one; "
+                    "move the path"
                 )
             island.append(wire)
     if not inside(loops[outer].polyline[:1], everything)[0]:
