@@ -88,13 +88,14 @@ class FaceBase:
     def _polynomials(self, s: Floats, needed: Floats) -> tuple[Floats, Floats]:
         """Reach (k,) and Chebyshev coefficients (k, degree + 1, 2) of the parameters over it."""
         key = s.tobytes()
-        found = self.kept.get(key)
-        if found is None or (needed > found[0] * (1 + 1e-12)).any():
-            reach = self.breadth(s) if found is None else found[0]
-            found = self._integrated(s, np.maximum(reach, needed * (1 + 1e-9)))
+        if key not in self.kept:
             if len(self.kept) >= _KEPT:
                 self.kept.pop(next(iter(self.kept)))
-            self.kept[key] = found
+            self.kept[key] = self._integrated(s, self.breadth(s))
+        found = self.kept[key]
+        if (needed > found[0] * (1 + 1e-9)).any():
+            # not kept: what is found within the strip must not depend on what was asked before
+            return self._integrated(s, np.maximum(found[0], needed))
         return found
 
     def _integrated(self, s: Floats, reach: Floats) -> tuple[Floats, Floats]:

@@ -118,12 +118,12 @@ def moved(host: Host, a: Floats, b: Floats) -> float:
 def settled(host: Host, x: Floats, before: Floats | None, size: float, round_: int) -> bool:
     """Whether halved steps left the points (..., 2) where they were, to 1e-8 of a size.
 
-    Where a surface is only C2, halving gains less than it should; from the fourth time on 1e-6 will do:
+    Where a surface is only C2, halving gains less than it should; from the third time on 1e-6 will do:
     places along the surface are meant, points lie on it in any case.
     """
     if before is None:
         return False
-    return moved(host, x, before) <= size * (15 * _CLOSE if round_ < 3 else 100 * _CLOSE)
+    return moved(host, x, before) <= size * (15 * _CLOSE if round_ < 2 else 100 * _CLOSE)
 
 
 def developed_path(host: Host, ridge: Stations, at: Floats, tangent: Floats) -> FacePath:
@@ -290,5 +290,5 @@ def _check_corner(host: Host, before: dict[str, Floats], after: dict[str, Floats
         angle = np.degrees(2 * np.arcsin(min(1.0, turn / 2)))
         raise ValueError(
             f"path: expected a smooth one, it has a corner of {angle:.3g} degrees at "
-            f" {np.round(p, 6).tolist()}; round it with a radius above half the strip's breadth"
+            f"{np.round(p, 6).tolist()}; round it with a radius above half the strip's breadth"
         )

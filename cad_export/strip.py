@@ -15,7 +15,7 @@ from OCP.BRepTopAdaptor import BRepTopAdaptor_FClass2d
 from OCP.GCPnts import GCPnts_AbscissaPoint
 from OCP.gp import gp_Pnt2d
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_IN, TopAbs_VERTEX
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_IN, TopAbs_ON, TopAbs_State, TopAbs_VERTEX
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
@@ -169,7 +169,20 @@ def check_inside(strip: Samples, host: Host) -> None:
 def in_face(face: TopoDS_Face, x: Floats) -> NDArray[np.bool_]:
     """(n,) whether parameters (n, 2), on whatever period, lie inside the face (BRepTopAdaptor_FClass2d)."""
     classifier = BRepTopAdaptor_FClass2d(face, 1e-9)
-    return np.array([classifier.Perform(gp_Pnt2d(u, v)) == TopAbs_IN for u, v in x.tolist()], dtype=bool)
+    u0, u1, v0, v1 = BRepTools.UVBounds_s(face)
+    du, dv = 1e-6 * (u1 - u0), 1e-6 * (v1 - v0)
+
+    def state(u: float, v: float) -> TopAbs_State:
+        return classifier.Perform(gp_Pnt2d(u, v))
+
+    def inner(u: float, v: float) -> bool:
+        found = state(u, v)
+        if found != TopAbs_ON:
+            return bool(found == TopAbs_IN)
+        # on the seam the face lies all around, on its border it does not
+        return all(state(u + a, v + b) == TopAbs_IN for a in (-du, du) for b in (-dv, dv))
+
+    return np.array([inner(u, v) for u, v in x.tolist()], dtype=bool)
 
 
 def edge_points(face: TopoDS_Face, step: float) -> tuple[Floats, NDArray[np.bool_], Floats]:
