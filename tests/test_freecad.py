@@ -1,4 +1,4 @@
-"""The FreeCAD macro: its data, its plain Python without FreeCAD, and what FreeCAD makes of it."""
+"""The FreeCAD macro: its data, and its plain Python without FreeCAD."""
 
 from __future__ import annotations
 
@@ -8,20 +8,17 @@ import json
 import math
 import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
-import cadquery as cq
 import numpy as np
 import pytest
-from freecad_tools import closed, inspect_step, inspect_step_by_gmsh, needs_freecad, needs_gmsh, run_freecad
+from freecad_stub import StubObject, run_stubbed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import spiral_ridge
 
-import cad_export as cx
 import ridgefeature as rf
-from cad_export.check import volume
 from cad_export.freecad import write_macro
 from cad_export.freecad.affine import affine_poles
 from ridgefeature.io.feature import to_document
@@ -39,68 +36,6 @@ def macro(ridge, tmp_path_factory) -> Path:
     return write_macro(ridge, tmp_path_factory.mktemp("macro") / "spiral.FCMacro")
 
 
-# A stand-in for as much of FreeCAD as the macro uses
-
-
-class StubObject:
-    def __init__(self) -> None:
-        self.PropertiesList: list[str] = []
-        self.tips: dict[str, str] = {}
-        self.Proxy: Any = None
-        self.Shape: Any = None
-
-    def addProperty(self, kind, name, group="", tip="", attributes=0, read_only=False, hidden=False):
-        self.PropertiesList.append(name)
-        self.tips[name] = tip
-
-    def touch(self) -> None:
-        pass
-
-
-class StubDocument:
-    def __init__(self) -> None:
-        self.Objects: list[StubObject] = []
-
-    def addObject(self, kind: str, name: str) -> StubObject:
-        self.Objects.append(StubObject())
-        return self.Objects[-1]
-
-    def openTransaction(self, name: str) -> None:
-        pass
-
-    def commitTransaction(self) -> None:
-        pass
-
-    def recompute(self) -> None:
-        for one in self.Objects:
-            one.Proxy.execute(one)
-
-
-class StubSpline:
-    def buildFromPolesMultsKnots(self, *given: Any) -> None:
-        self.given = given
-
-    def toShape(self) -> tuple[Any, ...]:
-        return self.given
-
-
-def run_stubbed(macro: Path, document: StubDocument | None = None) -> StubDocument:
-    """Run a macro in a document of a FreeCAD that is not there."""
-    document = document or StubDocument()
-    stubs = {"FreeCAD": ModuleType("FreeCAD"), "Part": ModuleType("Part")}
-    stubs["FreeCAD"].__dict__.update(Vector=lambda *xyz: xyz, ActiveDocument=document, GuiUp=False)
-    stubs["Part"].__dict__.update(BSplineSurface=StubSpline)
-    before = {name: sys.modules.get(name) for name in stubs}
-    sys.modules.update(stubs)
-    try:
-        exec(compile(macro.read_text(encoding="ascii"), macro.name, "exec"), {"__name__": "__main__"})
-    finally:
-        sys.modules.update({name: module for name, module in before.items() if module is not None})
-        for name in (name for name, module in before.items() if module is None):
-            del sys.modules[name]
-    return document
-
-
 @pytest.fixture(scope="module")
 def stub(macro) -> StubObject:
     return run_stubbed(macro).Objects[0]
@@ -110,9 +45,6 @@ def shape_at(stub: StubObject, h: float, w: float) -> Any:
     stub.Height, stub.Width = h, w
     stub.Proxy.execute(stub)
     return stub.Shape
-
-
-# Without FreeCAD
 
 
 def test_the_macro_needs_nothing_but_freecad_and_the_standard_library(macro):
@@ -237,254 +169,3 @@ def test_a_ridge_whose_poles_are_not_affine_is_refused(ridge):
     bent = Bent(**{f.name: getattr(ridge, f.name) for f in dataclasses.fields(ridge)})
     with pytest.raises(ValueError, match="affine in h and w"):
         affine_poles(bent)
-
-
-# In FreeCAD
-
-OPEN = """
-import FreeCAD
-def run():
-    exec(compile(open(macro).read(), "macro", "exec"), {"__name__": "__main__"})
-def state():
-    box, spline = ridge.Shape.optimalBoundingBox(False), ridge.Shape.Faces[0].Surface
-    return {
-        "box": [box.XMin, box.YMin, box.ZMin, box.XMax, box.YMax, box.ZMax],
-        "poles": [[list(p) for p in row] for row in spline.getPoles()],
-        "valid": ridge.Shape.isValid(), "status": ridge.getStatusString(), "names": [
-            one.Name for one in document.Objects], "rates": [ridge.Height, ridge.Width],
-    }
-"""
-
-
-def extremes(surface: rf.bspline.Surface) -> list[float]:
-    """The smallest and largest x, y and z of a surface: samples, and ever finer ones around the best."""
-    ends = []
-    for sign in (1.0, -1.0):
-        for axis in range(3):
-            (u0, u1), (v0, v1) = low_high = surface.domain
-            nu, nv = 20 * surface.poles.shape[0], 20 * surface.poles.shape[1]
-            for _ in range(12):
-                u, v = np.linspace(u0, u1, nu), np.linspace(v0, v1, nv)
-                values = sign * surface.on_grid(u, v)[..., axis]
-                i, j = np.unravel_index(values.argmin(), values.shape)
-                u0, u1 = np.clip([u[i] - 2 * (u[1] - u[0]), u[i] + 2 * (u[1] - u[0])], *low_high[0])
-                v0, v1 = np.clip([v[j] - 2 * (v[1] - v[0]), v[j] + 2 * (v[1] - v[0])], *low_high[1])
-                nu = nv = 21
-            ends.append(sign * float(values.min()))
-    return ends
-
-
-@needs_freecad
-def test_freecad_makes_the_surface_again_at_other_rates(ridge, macro):
-    script = """
-run()
-document = FreeCAD.ActiveDocument
-ridge = document.getObject("Ridge")
-result = {"first": state()}
-ridge.Height = 2
-document.recompute()
-result["taller"] = state()
-ridge.Height, ridge.Width = 1, 1.5
-document.recompute()
-result["wider"] = state()
-"""
-    found = run_freecad(OPEN + script, macro=str(macro))
-    boxes = {}
-    for name, h, w in (("first", 1, 1), ("taller", 2, 1), ("wider", 1, 1.5)):
-        surface = ridge.resized(h=h, w=w).surface()
-        assert found[name]["valid"] and found[name]["names"] == ["Ridge"]
-        np.testing.assert_allclose(found[name]["poles"], surface.poles, rtol=0, atol=1e-12 * 50)
-        boxes[name] = np.array(extremes(surface))
-        np.testing.assert_allclose(found[name]["box"], boxes[name], rtol=0, atol=1e-6)
-    for name in ("taller", "wider"):
-        growth = np.subtract(found[name]["box"], found["first"]["box"])
-        np.testing.assert_allclose(growth, boxes[name] - boxes["first"], rtol=0, atol=1e-6)
-    assert found["taller"]["box"][5] > 1.9 * found["first"]["box"][5]
-
-
-@needs_freecad
-def test_freecad_shows_bad_rates_and_keeps_the_shape_and_the_place(macro):
-    script = """
-run()
-document = FreeCAD.ActiveDocument
-ridge = document.getObject("Ridge")
-ridge.Placement.Base = FreeCAD.Vector(1, 2, 3)
-ridge.Height = 2
-document.recompute()
-before, refused = ridge.Shape.Area, []
-for name, values in (("Width", widths), ("Height", heights)):
-    for value in values:
-        setattr(ridge, name, value)
-        document.recompute()
-        refused.append([name, ridge.getStatusString(), ridge.Shape.Area == before, ridge.isValid()])
-    setattr(ridge, name, 1.5)
-document.recompute()
-result = {"refused": refused, "after": ridge.isValid() and ridge.Shape.Area != before,
-    "place": list(ridge.Placement.Base), "tips": [ridge.getDocumentationOfProperty(n) for n in (
-        "Height", "Width")], "groups": [ridge.getGroupOfProperty(n) for n in ("Height", "Width")],
-    "modes": [ridge.getEditorMode(n) for n in ("Height", "RidgeSource", "RidgeFeature")]}
-"""
-    found = run_freecad(OPEN + script, macro=str(macro), widths=BAD_WIDTHS, heights=(math.nan, math.inf))
-    assert len(found["refused"]) == 7
-    for name, status, kept, valid in found["refused"]:
-        assert status.startswith(f"{name}: expected a"), status
-        assert kept and not valid
-    assert found["after"] and found["place"] == [1, 2, 3]
-    assert found["groups"] == ["Ridge", "Ridge"] and all(found["tips"])
-    assert found["modes"] == [[], ["ReadOnly"], ["ReadOnly", "Hidden"]]
-
-
-@needs_freecad
-def test_a_saved_ridge_wakes_when_the_macro_runs_again(ridge, macro, tmp_path):
-    path = str(tmp_path / "part.FCStd")
-    make = """
-run()
-document = FreeCAD.ActiveDocument
-ridge = document.getObject("Ridge")
-ridge.Height, ridge.Width = 1.7, 0.9
-document.recompute()
-document.saveAs(path)
-result = state()
-"""
-    saved = run_freecad(OPEN + make, macro=str(macro), path=path)
-    again = """
-document = FreeCAD.openDocument(path)
-ridge = document.getObject("Ridge")
-result = {"asleep": state(), "proxy": ridge.Proxy is None}
-document.UndoMode = 1
-run()
-result["awake"], result["undo"] = state(), document.UndoNames
-ridge.Height = 2
-document.recompute()
-result["taller"] = state()
-FreeCAD.closeDocument(document.Name)
-document = FreeCAD.openDocument(path)
-ridge = document.getObject("Ridge")
-ridge.Height = 2
-document.recompute()
-run()
-result["changed asleep"] = state()
-"""
-    found = run_freecad(OPEN + again, macro=str(macro), path=path)
-    assert found["proxy"] and found["undo"] == []
-    for state in (found["asleep"], found["awake"]):
-        assert state["names"] == ["Ridge"] and state["rates"] == [1.7, 0.9] and state["valid"]
-        np.testing.assert_allclose(state["poles"], saved["poles"], rtol=0, atol=1e-12 * 50)
-    wanted = ridge.resized(h=2, w=0.9).surface().poles
-    for name in ("taller", "changed asleep"):
-        np.testing.assert_allclose(found[name]["poles"], wanted, rtol=0, atol=1e-12 * 50)
-
-
-@needs_freecad
-def test_the_macro_runs_from_the_command_line(ridge, macro, tmp_path):
-    path = tmp_path / "part.FCStd"
-    look = """
-document = FreeCAD.ActiveDocument
-ridge = document.getObject("Ridge")
-result = {**state(), "awake": ridge.Proxy is not None}
-document.saveAs(path)
-"""
-    other = write_macro(ridge.resized(h=2), tmp_path / "other.FCMacro")
-    first = run_freecad(OPEN + look, files=[macro], path=str(path))
-    again = run_freecad(OPEN + look, files=[path, macro], path=str(path))
-    two = run_freecad(OPEN + look, files=[path, other], path=str(path))
-    assert first["awake"] and again["awake"] and two["awake"]
-    assert first["names"] == again["names"] == ["Ridge"]
-    assert two["names"] == ["Ridge", "Ridge001"]
-
-
-@needs_freecad
-def test_adding_a_ridge_is_one_step_to_undo(macro):
-    script = """
-document = FreeCAD.newDocument("Part")
-document.UndoMode = 1
-box = document.addObject("Part::Box", "Box")
-run()
-names = lambda: [one.Name for one in document.Objects]
-result = {"added": names(), "steps": document.UndoNames}
-document.undo()
-result["undone"] = names()
-document.redo()
-ridge = document.getObject("Ridge")
-result["redone"], area = names(), ridge.Shape.Area
-ridge.Height = 3
-document.recompute()
-result["grown"] = ridge.Shape.Area / area
-"""
-    found = run_freecad(OPEN + script, macro=str(macro))
-    assert found["added"] == found["redone"] == ["Box", "Ridge"]
-    assert found["steps"][0] == "Add ridge" and found["undone"] == ["Box"]
-    assert found["grown"] > 1.2
-
-
-@needs_freecad
-def test_scripts_that_fail_say_so():
-    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
-        run_freecad("result = {'x': 1 / 0}")
-    assert run_freecad("result = {'twice': 2 * x}", x=1.5) == {"twice": 3.0}
-
-
-# STEP files as FreeCAD and gmsh see them
-
-
-@pytest.fixture(scope="module")
-def steps(ridge, tmp_path_factory) -> tuple[Path, Path, float]:
-    """A slab, a face alone, and the volume of the slab."""
-    folder = tmp_path_factory.mktemp("step")
-    slab = cx.solid(ridge, 2.0, check=False)
-    return (
-        cx.step(slab, folder / "slab.step"),
-        cx.step(ridge, folder / "face.step"),
-        volume(slab.wrapped, 1e-7),
-    )
-
-
-by_both = pytest.mark.parametrize(
-    "inspect",
-    [pytest.param(inspect_step, marks=needs_freecad), pytest.param(inspect_step_by_gmsh, marks=needs_gmsh)],
-)
-
-
-@by_both
-def test_others_find_one_closed_solid_of_our_volume(steps, inspect):
-    slab, face, wanted = steps
-    found = inspect(slab)
-    assert (found["solids"], found["faces"]) == (1, 6)
-    assert found["closed_mesh"] and found.get("valid", True)
-    assert found["volume"] == pytest.approx(wanted, rel=1e-4)
-    assert found.get("mesh_volume", wanted) == pytest.approx(wanted, rel=1e-3)
-    alone = inspect(face)
-    assert (alone["solids"], alone["faces"], alone["volume"]) == (0, 1, 0.0)
-    assert not alone["closed_mesh"] and alone.get("valid", True)
-
-
-@by_both
-def test_others_find_what_is_wrong_with_a_file(inspect, tmp_path):
-    box = cq.Solid.makeBox(1, 2, 3)
-    pair = inspect(cx.step(cq.Compound.makeCompound([box, box.moved(x=5)]), tmp_path / "pair.step"))
-    assert (pair["solids"], pair["faces"], pair["volume"]) == (2, 12, pytest.approx(12))
-    open_box = inspect(cx.step(cq.Shell.makeShell(box.Faces()[:5]), tmp_path / "open.step"))
-    assert (open_box["solids"], open_box["faces"], open_box["closed_mesh"]) == (0, 5, False)
-    whole = (tmp_path / "pair.step").read_text()
-    for name, text in (("empty", ""), ("words", "no STEP"), ("cut", whole[: len(whole) // 2])):
-        path = tmp_path / f"{name}.step"
-        path.write_text(text)
-        with pytest.raises(RuntimeError):
-            inspect(path)
-
-
-@needs_freecad
-def test_freecads_own_check_names_faces_that_cross(tmp_path):
-    box = cq.Solid.makeBox(1, 2, 3)
-    assert inspect_step(cx.step(box, tmp_path / "box.step"), check=True)["faults"] == ""
-    crossed = cq.Compound.makeCompound([box, box.moved(x=0.5, y=0.5, z=0.5)])
-    assert "Intersect" in inspect_step(cx.step(crossed, tmp_path / "crossed.step"), check=True)["faults"]
-
-
-def test_a_mesh_is_closed_when_two_triangles_share_every_edge():
-    tetrahedron = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]
-    assert closed(tetrahedron)
-    assert closed([*tetrahedron, (0, 0, 1)])
-    assert not closed(tetrahedron[1:])
-    assert not closed([*tetrahedron, (0, 1, 4)])
-    assert not closed([])
