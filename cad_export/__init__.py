@@ -1,6 +1,7 @@
 """Ridge features as CAD: exact faces and solids in CadQuery, and STEP files.
 
 Names are imported where they are first used: writing a STEP file needs OCP, but not all of cadquery.
+Importing this package adds `pasteRidge` to CadQuery's Workplane, now or as soon as cadquery is imported.
 """
 
 from __future__ import annotations
@@ -8,12 +9,17 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from cad_export.workplane_method import install_when_loaded
+
 if TYPE_CHECKING:
     from cad_export.carried import attach, carried_by
+    from cad_export.fluent import ridge
     from cad_export.formats import write
     from cad_export.geometry import surface_of
     from cad_export.loading import carried_in, load
+    from cad_export.pasting import paste
     from cad_export.record import Carried
+    from cad_export.regeneration import regenerate
     from cad_export.shapes import face, solid
     from cad_export.step_file import read_step, step
 
@@ -24,7 +30,10 @@ __all__ = [
     "carried_in",
     "face",
     "load",
+    "paste",
     "read_step",
+    "regenerate",
+    "ridge",
     "solid",
     "step",
     "surface_of",
@@ -39,7 +48,10 @@ _HOME = {
     "carried_in": "loading",
     "face": "shapes",
     "load": "loading",
+    "paste": "pasting",
     "read_step": "step_file",
+    "regenerate": "regeneration",
+    "ridge": "fluent",
     "solid": "shapes",
     "step": "step_file",
     "surface_of": "geometry",
@@ -57,3 +69,6 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+install_when_loaded()

@@ -1,0 +1,193 @@
+"""Paste: a host solid with a ridge grown out of one of its faces, as a feature that regenerates."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import cadquery as cq
+import numpy as np
+from numpy.typing import ArrayLike
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.gp import gp_Pnt
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+
+from cad_export.carried import faces_of, record_of
+from cad_export.face_base import FaceBase, face_base
+from cad_export.geometry import topods
+from cad_export.inset import face_with, inset
+from cad_export.paste_history import Placement, remember
+from ridgefeature.bspline import Surface
+from ridgefeature.ridge import Ridge
+from ridgefeature.scan import millimetres_per
+
+
+def paste(
+    ridge: Ridge,
+    host: Any,
+    face: Any = None,
+    path: Any = None,
+    at: ArrayLike | None = None,
+    direction: ArrayLike | None = None,
+    h: float = 1,
+    w: float = 1,
+    *,
+    fit: str = "length",
+    scale: float = 1,
+    mirror: bool = False,
+    reverse: bool = False,
+    check: bool = True,
+    report: dict[str, Any] | None = None,
+    name: str = "ridge",
+) -> cq.Solid:
+    """The host solid with the ridge grown out of a face; a negative h engraves.
+
+    host: a cq.Solid, a Workplane with one, or anything whose `.wrapped` is a TopoDS_Shape with one solid, in
+    millimetres; it is not changed. face: one of its faces; left out, the one nearest to `at` or `path`, or
+    its largest. The ridge's own shape is developed onto the face, its bends kept as geodesic curvature: its
+    middle comes to `at` (3,), by default the middle of the face, along `direction` (3,). Or it follows
+    `path`, an edge or wire on the face; fit tells whether its profile is then stretched ("length"), scaled as
+    a whole ("scale") or cut ("trim"). A closed edge makes a ring. h, w: rates. scale: of the whole ridge.
+    mirror: left and right changed; reverse: start and end.
+
+    The result has passed a fast certificate: one closed solid, its volume against the surface's own integral,
+    edge tolerances, the footprint inside the face; check=True adds OCCT's search for self-intersections and a
+    closed mesh. report: filled with method, volumes, largest tolerance and seconds. name: that of the ridge's
+    face in STEP files. Raises ValueError that says what to change.
+    """
+    solid = _solid_of(host)
+    chosen = _face_of(solid, face, path, at)
+    stand = _stand(_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse)
+    surface, foot = stand.surface(h, w), stand.surface(0, w)
+    result, told = inset(solid, chosen, surface, foot, check=check)
+    if report is not None:
+        report.update(asdict(told))
+    options = {"fit": fit, "scale": scale, "mirror": mirror, "reverse": reverse}
+    place = Placement(stand.middle, at, direction, path, options, told.volume_added)
+    remember(solid, result, face_with(result, surface), record_of(ridge, h, w, name), place)
+    return cq.Solid(result)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stand:
+    """A ridge on the base of one place of a host's face, and what identified them, held."""
+
+    held: tuple[Any, ...]
+    base: FaceBase
+    ridge: Ridge
+    feet: dict[float, Surface] = field(default_factory=dict)
+
+    def surface(self, h: float, w: float) -> Surface:
+        """The surface at these rates; for h = 0 remembered."""
+        if h == 0 and w in self.feet:
+            return self.feet[w]
+        sized = self.ridge if h == 1 and w == 1 else self.ridge.resized(h=h, w=w)
+        found = sized.surface(self.base)
+        if h == 0:
+            self.feet[w] = found
+        return found
+
+    @property
+    def middle(self) -> tuple[float, float, float]:
+        """The point of the face under the middle of the ridge."""
+        x, y, z = self.base(np.array([0.5 * self.base.length]), np.zeros((1, 1)))[0][0, 0].tolist()
+        return x, y, z
+
+
+_STANDS: OrderedDict[tuple[Any, ...], _Stand] = OrderedDict()
+_KEPT = 16
+"""Stands that are remembered: a slider pastes again and again at one place."""
+
+
+def _stand(
+    ridge: Ridge,
+    face: TopoDS_Face,
+    path: Any,
+    at: ArrayLike | None,
+    direction: ArrayLike | None,
+    fit: str,
+    scale: float,
+    mirror: bool,
+    reverse: bool,
+) -> _Stand:
+    """The ridge on the face's base along the path, remembered."""
+    along = None if path is None else topods(path)
+    held = (ridge, face.TShape(), along and along.TShape())
+    places = [repr(None if value is None else np.asarray(value).tolist()) for value in (at, direction)]
+    locations = [shape and shape.Location().HashCode() for shape in (face, along)]
+    key = (*map(id, held), face.Orientation(), *locations, *places, fit, scale, mirror, reverse)
+    if key not in _STANDS:
+        base, fitted = face_base(
+            face,
+            _in_millimetres(ridge, scale),
+            path=path,
+            at=at,
+            direction=direction,
+            fit=fit,
+            mirror=mirror,
+            reverse=reverse,
+        )
+        _STANDS[key] = _Stand(held, base, fitted)
+        while len(_STANDS) > _KEPT:
+            _STANDS.popitem(last=False)
+    return _STANDS[key]
+
+
+def _checked(ridge: Any) -> Ridge:
+    if not isinstance(ridge, Ridge):
+        raise ValueError(f"ridge: expected a Ridge, got {type(ridge).__name__}; register or load one first")
+    return ridge
+
+
+def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
+    """The same ridge, `scale` times as large, in the unit of CAD shapes."""
+    if not (isinstance(scale, (int, float)) and np.isfinite(scale) and scale > 0):
+        raise ValueError(f"scale: expected a finite number above 0, got {scale!r}")
+    factor = scale * millimetres_per(ridge.unit)
+    if factor == 1:
+        return ridge
+    names = ("arc_length", "spine", "height", "width", "height_std", "width_std", "border")
+    return replace(ridge, unit="mm", **{name: factor * getattr(ridge, name) for name in names})
+
+
+def _solid_of(host: Any) -> TopoDS_Shape:
+    """The only solid in a shape or on a Workplane's stack."""
+    shapes = host.vals() if hasattr(host, "vals") else [host]
+    solids = []
+    for shape in shapes:
+        explorer = TopExp_Explorer(topods(shape), TopAbs_SOLID)
+        while explorer.More():
+            solids.append(explorer.Current())
+            explorer.Next()
+    if len(solids) != 1:
+        raise ValueError(f"host: expected one solid, got {len(solids)}; make one, or choose one of them")
+    return solids[0]
+
+
+def _face_of(solid: TopoDS_Shape, face: Any, path: Any, at: ArrayLike | None) -> TopoDS_Face:
+    """The given face; else the one nearest to the place or path, else the largest."""
+    if face is not None:
+        shape = topods(face)
+        if shape.ShapeType() != TopAbs_FACE:
+            raise ValueError(f"face: expected a face, got {type(face).__name__}; select one face of the host")
+        return TopoDS.Face_s(shape)
+    faces = faces_of(solid)
+    if path is not None or at is not None:
+        goal = _vertex(at) if path is None else topods(path)
+        return min(faces, key=lambda f: BRepExtrema_DistShapeShape(goal, f).Value())
+    areas = [cq.Face(f).Area() for f in faces]
+    largest = max(areas)
+    if sum(a > (1 - 1e-6) * largest for a in areas) > 1:
+        raise ValueError("face: the host has several largest faces; give face=, at= or path=")
+    return faces[areas.index(largest)]
+
+
+def _vertex(at: ArrayLike | None) -> TopoDS_Shape:
+    point = np.asarray(at, dtype=np.float64)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise ValueError(f"at: expected three finite numbers x, y, z, got {at!r}")
+    return BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
