@@ -225,9 +225,12 @@ def inside(points: Floats, segments: Floats) -> NDArray[np.bool_]:
 def cross(a: Floats, b: Floats) -> bool:
     """Whether any straight piece of a (n, 2, 2) meets one of b (m, 2, 2)."""
     low, high = a.min(axis=(0, 1)), a.max(axis=(0, 1))
-    b = b[((b.max(axis=1) >= low) & (b.min(axis=1) <= high)).all(axis=1)]
-    if not len(b):
-        return False
+    near = b[((b.max(axis=1) >= low) & (b.min(axis=1) <= high)).all(axis=1)]
+    return bool(meetings(a, near).any())
+
+
+def meetings(a: Floats, b: Floats) -> NDArray[np.bool_]:
+    """Which straight pieces of a (n, 2, 2) meet which of b (m, 2, 2): (n, m); parallel ones do not."""
     p, r = a[:, None, 0], (a[:, 1] - a[:, 0])[:, None]
     q, s = b[None, :, 0], (b[:, 1] - b[:, 0])[None]
     d = q - p
@@ -236,7 +239,7 @@ def cross(a: Floats, b: Floats) -> bool:
     t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / safe
     u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / safe
     with np.errstate(invalid="ignore"):
-        return bool(((t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)).any())
+        return np.asarray((t >= 0) & (t <= 1) & (u >= 0) & (u <= 1))
 
 
 def surface_on(face: TopoDS_Face) -> HostSurface:

@@ -38,6 +38,7 @@ from cad_export.footprint import (
     cross,
     curve2d,
     inside,
+    meetings,
     on_host,
     segments_of,
     signed_area,
@@ -190,16 +191,12 @@ def _check_folds(surface: Surface, base: Surface) -> None:
 
 def _check_loops(loops: list[_Loop]) -> None:
     """Raise ValueError where the border crosses itself."""
-    line = np.concatenate([_pieces_of(loop.polyline[:: 1 + len(loop.polyline) // 300]) for loop in loops])
-    n = len(line)
-    for k in range(0, n, 64):
-        some = np.arange(k, min(k + 64, n))
-        others = line[(np.arange(n) < k - 1) | (np.arange(n) > some[-1] + 1)]
-        if k == 0:
-            others = others[:-1]
-        elif some[-1] == n - 1:
-            others = others[1:]
-        if cross(line[some], others):
+    lines = [_pieces_of(loop.polyline[:: 1 + len(loop.polyline) // 200]) for loop in loops]
+    for k, line in enumerate(lines):
+        i = np.arange(len(line))
+        apart = np.abs(i[:, None] - i)
+        meet = meetings(line, line) & (apart > 1) & (apart < len(line) - 1)
+        if meet.any() or any(cross(line, other) for other in lines[:k]):
             raise ValueError("surface: expected a border that does not cross itself, it does; move the path")
 
 
