@@ -40,17 +40,8 @@ def write(ridge_or_shape: Any, path: str | os.PathLike[str], h: float = 1, w: fl
     Ridge only. The file is written elsewhere in the folder and renamed.
     Raises ValueError for an unknown suffix or something that is no shape, OSError when it cannot be written.
     """
-    target = Path(path)
-    writer = FORMATS.get(target.suffix.lower())
-    if writer is None:
-        raise ValueError(
-            f"{target.name}: expected one of the suffixes {' '.join(known_suffixes())}, "
-            f"got {target.suffix!r}; choose one"
-        )
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"expected a folder to write to, got {str(target.parent)!r}; create it first")
-    if target.is_dir():
-        raise IsADirectoryError(f"{target}: expected a file to write, this is a folder; remove it")
+    target = checked_target(path)
+    writer = FORMATS[target.suffix.lower()]
     if writer is step:
         return step(ridge_or_shape, target, h=h, w=w)
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}.") as folder:
@@ -67,9 +58,19 @@ def write(ridge_or_shape: Any, path: str | os.PathLike[str], h: float = 1, w: fl
     return target
 
 
-def known_suffixes() -> list[str]:
-    """The suffixes that `write` takes."""
-    return list(FORMATS)
+def checked_target(path: str | os.PathLike[str]) -> Path:
+    """The path, which `write` can write to as far as can be told beforehand; raises as `write` does."""
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        known = " ".join(FORMATS).replace(".fcmacro", ".FCMacro")
+        raise ValueError(
+            f"{target.name}: expected one of the suffixes {known}; got {target.suffix!r}; choose one"
+        )
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{target.parent}: there is no such folder to write to: create it first")
+    if target.is_dir():
+        raise IsADirectoryError(f"{target}: expected a file to write, this is a folder: remove it")
+    return target
 
 
 def _iges(shape: TopoDS_Shape, path: Path) -> None:

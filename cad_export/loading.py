@@ -22,7 +22,7 @@ def load(path: str | os.PathLike[str], name: str | None = None) -> Ridge | tuple
     records = carried_in(path)
     if name is not None:
         records = [record for record in records if record.name == name] or _none_named(path, name, records)
-    ridges = tuple(_ridge(record, path) for record in records)
+    ridges = tuple(ridge_of(record, path) for record in records)
     return ridges[0] if len(ridges) == 1 else ridges
 
 
@@ -42,7 +42,8 @@ def _none_named(path: str | os.PathLike[str], name: str, records: list[Carried])
     raise ValueError(f"{Path(path).name}: expected one of the names {known}, got {name!r}; choose one")
 
 
-def _ridge(record: Carried, path: str | os.PathLike[str]) -> Ridge:
+def ridge_of(record: Carried, path: str | os.PathLike[str]) -> Ridge:
+    """The ridge of a record that came from this file."""
     try:
         return from_document(record.feature)
     except ValueError as error:

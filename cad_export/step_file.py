@@ -25,7 +25,7 @@ from cad_export.carried import attach, carried_by, faces_of
 from cad_export.geometry import RidgeLike, make_face, surface_for, topods
 from cad_export.occt_session import quiet
 from cad_export.record import Carried, record_of
-from cad_export.step_model import add_property, ascii_name, document, name_faces, name_products, named
+from cad_export.step_model import add_properties, ascii_name, document, name_faces, name_products, named
 from cad_export.step_properties import items, records_in
 from ridgefeature.bspline import Surface
 
@@ -93,7 +93,7 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
 
 def _attach_by_name(shape: TopoDS_Shape, records: dict[str, Carried], transfer: Any) -> None:
     """Give faces their records back: the name is that of the STEP entity that a face came from."""
-    done = []
+    done: list[Any] = []
     for face in faces_of(shape) if records else []:
         entity = transfer.EntityFromShapeResult(face, 1)
         if entity is None:  # of an instance, which is known where its part is
@@ -156,7 +156,7 @@ def _write(shape: TopoDS_Shape, path: Path, schema: str, name: str) -> None:
         # faces of one feature, which was cut in two, have one record
         records = list({record.name: record for _, record in features}.values())
         if records:
-            add_property(model, items(records))
+            add_properties(model, items(records))
         header = APIHeaderSection_MakeHeader(model)
         header.SetName(TCollection_HAsciiString(text))
         header.SetOriginatingSystem(TCollection_HAsciiString("ridgefeature"))

@@ -36,7 +36,6 @@ from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 from cad_export.carried import carried_by
 from cad_export.occt_arrays import label_sequence, representation_items
 from cad_export.record import Carried
-from cad_export.step_properties import PROPERTY
 
 COLOUR = Quantity_Color(0.85, 0.45, 0.10, Quantity_TOC_sRGB)
 """Of ridge faces."""
@@ -92,30 +91,31 @@ def name_faces(process: Any, features: list[tuple[TopoDS_Face, Carried]]) -> Non
                 entity.SetName(TCollection_HAsciiString(record.name))
 
 
-def add_property(model: Any, values: list[tuple[str, str]]) -> None:
-    """Give the first product a user property with these items, as ISO 10303-41 and -43 have it."""
+def add_properties(model: Any, values: list[tuple[str, str]]) -> None:
+    """Give the first product user properties with these names and values, as ISO 10303-41 and -43 have them.
+
+    One property each: STEPCAFControl_Reader takes only the last item of a property.
+    """
     entities = [model.Value(i) for i in range(1, model.NbEntities() + 1)]
     product = next(entity for entity in entities if isinstance(entity, StepBasic_ProductDefinition))
     context = next(entity for entity in entities if isinstance(entity, StepRepr_RepresentationContext))
-    text = TCollection_HAsciiString
-    target, definition = StepRepr_CharacterizedDefinition(), StepRepr_PropertyDefinition()
+    target = StepRepr_CharacterizedDefinition()
     target.SetValue(product)
-    definition.Init(text(PROPERTY), True, text("user defined attribute"), target)
-    kind, link = StepBasic_GeneralProperty(), StepBasic_GeneralPropertyAssociation()
-    kind.Init(text(PROPERTY), text(PROPERTY), True, text("user defined attribute"))
-    link.Init(text(PROPERTY), text(""), kind, definition)
-    pieces = []
     for name, value in values:
-        piece = StepRepr_DescriptiveRepresentationItem()
-        piece.Init(text(name), text(value))
-        pieces.append(piece)
-    representation, represented = StepRepr_Representation(), StepRepr_RepresentedDefinition()
-    representation.Init(text(PROPERTY), representation_items(pieces), context)
-    represented.SetValue(definition)
-    whole = StepRepr_PropertyDefinitionRepresentation()
-    whole.Init(represented, representation)
-    for entity in (whole, link):
-        model.AddWithRefs(entity)
+        text, kind = TCollection_HAsciiString(name), TCollection_HAsciiString("user defined attribute")
+        definition, general = StepRepr_PropertyDefinition(), StepBasic_GeneralProperty()
+        definition.Init(text, True, kind, target)
+        general.Init(text, text, True, kind)
+        link = StepBasic_GeneralPropertyAssociation()
+        link.Init(text, kind, general, definition)
+        item, representation = StepRepr_DescriptiveRepresentationItem(), StepRepr_Representation()
+        item.Init(text, TCollection_HAsciiString(value))
+        representation.Init(text, representation_items([item]), context)
+        represented, whole = StepRepr_RepresentedDefinition(), StepRepr_PropertyDefinitionRepresentation()
+        represented.SetValue(definition)
+        whole.Init(represented, representation)
+        for entity in (whole, link):
+            model.AddWithRefs(entity)
 
 
 def name_products(model: Any, name: str) -> None:

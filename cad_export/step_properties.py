@@ -1,8 +1,8 @@
-"""Ridge features as a user property of a STEP file: its items, and reading them from the file's text.
+"""Ridge features as user properties of a STEP file: their values, and reading them from the file's text.
 
 The text is JSON, packed by zlib (RFC 1950) and base64 (RFC 4648), and cut in pieces. Every piece is the value
-of one DESCRIPTIVE_REPRESENTATION_ITEM (ISO 10303-45), and one more holds a header, as JSON: the number of
-pieces and a checksum. No OCCT here: it takes no damaged file to be read safely, and a second to start.
+of a property's DESCRIPTIVE_REPRESENTATION_ITEM (ISO 10303-45), and one more holds a header, as JSON: the
+number of pieces and a checksum. Read without OCCT, which takes a second to start.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cad_export.record import Carried
 FORMAT = "ridgefeature.step"
 VERSION = 1
 PROPERTY = "ridgefeature"
-"""Name of the property, and the first word of its items' names."""
+"""First word of the properties' names."""
 PIECE = 8000
 """Characters of one string: OCCT cannot read a file with a string of more than about 16,000."""
 
@@ -32,7 +32,7 @@ _ITEM = re.compile(
 
 
 def items(records: Sequence[Carried]) -> list[tuple[str, str]]:
-    """Names and values of the items that hold these records; ASCII, values of at most PIECE characters.
+    """Names and values of the properties that hold these records; ASCII, values of at most PIECE characters.
 
     Raises ValueError where a placement or host is not plain JSON, or has numbers that are not finite.
     """

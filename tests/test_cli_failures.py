@@ -132,7 +132,7 @@ def test_bad_feature_files(change: Callable[[str], str], said: str, feature: Pat
 @pytest.mark.parametrize(
     ("name", "words", "said"),
     [
-        ("x.iges", (), ".step .stp .brep .stl"),
+        ("x.dwg", (), ".step .stp .iges .igs .brep .stl .3mf .glb .gltf .FCMacro"),
         ("no/x.step", (), "no such folder"),
         ("x.step", ("--w", -1), "width"),
         ("x.step", ("--w", 0), "width"),
@@ -150,5 +150,5 @@ def test_a_step_file_without_a_feature(tmp_path: Path) -> None:
     import cadquery as cq
 
     cq.Workplane().box(1, 1, 1).export(str(plain))
-    fails(run("export", plain, "-o", tmp_path / "x.step"), 2, "plain.step")
+    fails(run("export", plain, "-o", tmp_path / "x.step"), 2, "plain.step", "carries no ridge feature")
     assert [p.name for p in tmp_path.iterdir()] == ["plain.step"]

@@ -11,17 +11,24 @@ CAD = (".step", ".stp")
 
 
 def load_feature(path: Path) -> Ridge:
-    """The ridge in a .ridge.json, or in a STEP file that carries one. Raises OSError or ValueError."""
+    """The ridge as registered, in a .ridge.json or in a STEP file that carries one.
+
+    Raises OSError or ValueError.
+    """
     if path.is_dir():
         raise IsADirectoryError(f"{path}: expected a feature file, this is a folder: name a file in it")
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such file: check the path")
     if path.suffix.lower() not in CAD:
         return load(path)
-    import cad_export
+    from cad_export.loading import carried_in, ridge_of
 
-    read = getattr(cad_export, "load", None)
-    if read is None:
-        raise ValueError(f"{path}: this release does not read features from STEP: give the .ridge.json")
-    ridge: Ridge = read(path)
+    records = carried_in(path)
+    if len(records) > 1:
+        names = ", ".join(repr(record.name) for record in records)
+        raise ValueError(
+            f"{path}: expected one ridge feature, got {len(records)} ({names}); in Python, "
+            "cad_export.load(path, name=...).save(...) makes a .ridge.json of one"
+        )
+    ridge: Ridge = ridge_of(records[0], path)
     return ridge

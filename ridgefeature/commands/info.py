@@ -88,6 +88,7 @@ def _step(file: Path) -> Found:
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
     import cad_export
+    from cad_export.step_properties import records_in
 
     shape = cad_export.read_step(file)
     counts = {}
@@ -101,4 +102,26 @@ def _step(file: Path) -> Found:
     low, high = ends[:3], ends[3:]
     rows = [(name, f"{count:,}") for name, count in counts.items()]
     rows += [("unit", "mm"), ("lowest x y z", point(low)), ("highest x y z", point(high))]
-    return "a STEP file", rows, {"kind": "step", **counts, "unit": "mm", "low": list(low), "high": list(high)}
+    carried = [_carried(record) for record in records_in(file)]
+    rows += [
+        (
+            f"carries {one['name']}",
+            f"{number(one['length'])} {one['unit']} long, {one['templates']} templates, "
+            f"h {number(one['h'])}, w {number(one['w'])}",
+        )
+        for one in carried
+    ] or [("carries", "no ridge feature")]
+    box_of = {"unit": "mm", "low": list(low), "high": list(high)}
+    return "a STEP file", rows, {"kind": "step", **counts, **box_of, "features": carried}
+
+
+def _carried(record: Any) -> dict[str, Any]:
+    """What to tell of a feature in a STEP file; h and w are the rates at which it stands there."""
+    return {
+        "name": record.name,
+        "unit": record.feature["unit"],
+        "length": record.feature["stations"]["arc_length"][-1],
+        "templates": len(record.feature["templates"]),
+        "h": record.h,
+        "w": record.w,
+    }
