@@ -32,6 +32,7 @@ from ridgefeature.bspline import Surface
 Floats = NDArray[np.float64]
 Jet = tuple[Floats, ...]
 """Points and derivatives P, Pu, Pv, Puu, Puv, Pvv, each (..., 3)."""
+Evaluator = Callable[[Floats, Floats], Jet]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +40,13 @@ class Host:
     """The surface under a face; u and v may run over its seams and on beyond them."""
 
     face: TopoDS_Face
-    jet: Callable[[Floats, Floats], Jet]
+    jet: Evaluator
     periods: tuple[float, float]
     """Length of the parameter range along u and v where the surface closes on itself, else 0."""
     outward: float
     """1 where the face's outward normal is du x dv, else -1."""
+    tangents: Evaluator | None = None
+    """Only P, Pu and Pv, where they are cheaper."""
 
     def points(self, u: Floats, v: Floats) -> Floats:
         """Points (..., 3)."""
@@ -51,7 +54,7 @@ class Host:
 
     def frame(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Points and outward unit normals (..., 3)."""
-        p, pu, pv = self.jet(u, v)[:3]
+        p, pu, pv = (self.tangents or self.jet)(u, v)[:3]
         return p, self.normal(pu, pv)
 
     def normal(self, pu: Floats, pv: Floats) -> Floats:
@@ -66,6 +69,13 @@ class Host:
         a, b = (vector * pu).sum(axis=-1), (vector * pv).sum(axis=-1)
         det = e * g - f * f
         return np.stack([a * g - b * f, b * e - a * f], axis=-1) / det[..., None]
+
+    def left(self, rate: Floats, pu: Floats, pv: Floats) -> Floats:
+        """(..., 2): rates of u and v square to rates (..., 2), to their left with the normal upwards."""
+        e, f, g = ((a * b).sum(axis=-1) for a, b in ((pu, pu), (pu, pv), (pv, pv)))
+        a, b = rate[..., 0], rate[..., 1]
+        size = self.outward / np.sqrt(e * g - f * f)
+        return np.stack([-(f * a + g * b) * size, (e * a + f * b) * size], axis=-1)
 
     def foot(self, points: Floats, start: Floats) -> Floats:
         """Parameters (..., 2) of the foot points of points (..., 3), by Newton steps from start (..., 2)."""
@@ -93,10 +103,14 @@ def host_of(face: TopoDS_Face) -> Host:
         float(adaptor.VPeriod()) if adaptor.IsVPeriodic() else 0.0,
     )
     outward = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
-    return Host(face, _jet(adaptor, periods), periods, outward)
+    jet = _jet(adaptor, periods)
+    if jet is None:
+        return Host(face, _one_by_one(adaptor, 2), periods, outward, _one_by_one(adaptor, 1))
+    return Host(face, jet, periods, outward)
 
 
-def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Callable[[Floats, Floats], Jet]:
+def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Evaluator | None:
+    """The surface in closed form or by its poles, None for kinds that have to be evaluated by OCCT."""
     kind = adaptor.GetType()
     if kind == GeomAbs_Plane:
         return _plane(_axes(adaptor.Plane().Position()))
@@ -119,7 +133,7 @@ def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Callable
         return _revolved(_axes(form.Position()), _circle(large, _small_radius(form)))
     if kind == GeomAbs_BSplineSurface and not (adaptor.IsURational() or adaptor.IsVRational()):
         return _spline(adaptor, periods)
-    return _one_by_one(adaptor)
+    return None
 
 
 def _small_radius(form: Any) -> float:
@@ -132,7 +146,7 @@ def _axes(position: gp_Ax3) -> Floats:
     return np.array([(a.X(), a.Y(), a.Z()) for a in places])
 
 
-def _plane(axes: Floats) -> Callable[[Floats, Floats], Jet]:
+def _plane(axes: Floats) -> Evaluator:
     def jet(u: Floats, v: Floats) -> Jet:
         points = axes[0] + u[..., None] * axes[1] + v[..., None] * axes[2]
         zero = np.zeros_like(points)
@@ -149,7 +163,7 @@ def _circle(large: float, small: float) -> Callable[[Floats], Jet]:
     return meridian
 
 
-def _revolved(axes: Floats, meridian: Callable[[Floats], Jet]) -> Callable[[Floats, Floats], Jet]:
+def _revolved(axes: Floats, meridian: Callable[[Floats], Jet]) -> Evaluator:
     """r(v) (cos u x + sin u y) + z(v) z, for r, r', r'', z, z', z'' from the meridian."""
 
     def jet(u: Floats, v: Floats) -> Jet:
@@ -169,7 +183,7 @@ def _revolved(axes: Floats, meridian: Callable[[Floats], Jet]) -> Callable[[Floa
     return jet
 
 
-def _spline(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Callable[[Floats, Floats], Jet]:
+def _spline(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Evaluator:
     """By the coefficients of every patch in powers: quicker than basis functions for few places at a time."""
     surface = from_occt(adaptor.BSpline())
     breaks, coefficients = _patches(surface)
@@ -220,24 +234,25 @@ def _patches(surface: Surface) -> tuple[tuple[Floats, Floats], Floats]:
     return (breaks[0], breaks[1]), np.ascontiguousarray(np.array(terms).transpose(2, 3, 0, 1, 4))
 
 
-def _one_by_one(adaptor: BRepAdaptor_Surface) -> Callable[[Floats, Floats], Jet]:
-    (u0, u1, v0, v1) = (
-        adaptor.FirstUParameter(),
-        adaptor.LastUParameter(),
-        adaptor.FirstVParameter(),
-        adaptor.LastVParameter(),
+def _one_by_one(adaptor: BRepAdaptor_Surface, order: int) -> Evaluator:
+    """Points and derivatives up to that order, 1 or 2, a call of OCCT for each place."""
+    ends = (
+        (adaptor.IsUPeriodic(), adaptor.FirstUParameter(), adaptor.LastUParameter()),
+        (adaptor.IsVPeriodic(), adaptor.FirstVParameter(), adaptor.LastVParameter()),
     )
-    limits = [(-np.inf, np.inf) if adaptor.IsUPeriodic() else (u0, u1)]
-    limits.append((-np.inf, np.inf) if adaptor.IsVPeriodic() else (v0, v1))
-    p, d = gp_Pnt(), [gp_Vec() for _ in range(5)]
+    limits = [(-np.inf, np.inf) if periodic else (low, high) for periodic, low, high in ends]
+    p, d = gp_Pnt(), [gp_Vec() for _ in range(2 if order == 1 else 5)]
+    evaluate = adaptor.D1 if order == 1 else adaptor.D2
+    found = (p, *d) if order == 1 else (p, d[0], d[1], d[2], d[4], d[3])  # OCCT's order: uu, vv, uv
 
     def jet(u: Floats, v: Floats) -> Jet:
         uu, vv = np.broadcast_arrays(np.clip(u, *limits[0]), np.clip(v, *limits[1]))
-        values = np.empty((uu.size, 6, 3))
-        for i, (a, b) in enumerate(zip(uu.ravel().tolist(), vv.ravel().tolist(), strict=True)):
-            adaptor.D2(a, b, p, *d)
-            values[i] = [(x.X(), x.Y(), x.Z()) for x in (p, *(d[j] for j in (0, 1, 2, 4, 3)))]
-        shaped = values.reshape(*uu.shape, 6, 3)
-        return tuple(shaped[..., j, :] for j in range(6))
+        values: list[float] = []
+        for a, b in zip(uu.ravel().tolist(), vv.ravel().tolist(), strict=True):
+            evaluate(a, b, p, *d)
+            for x in found:
+                values += (x.X(), x.Y(), x.Z())
+        shaped = np.array(values).reshape(*uu.shape, len(found), 3)
+        return tuple(shaped[..., j, :] for j in range(len(found)))
 
     return jet
