@@ -1,4 +1,7 @@
-"""Whether a change of a solid did what it should: a fast certificate, and OCCT's thorough checks. OCP only."""
+"""Whether a change of a solid did what it should: a fast certificate, and OCCT's thorough checks.
+
+OCP only, no cadquery.
+"""
 
 from __future__ import annotations
 
@@ -37,13 +40,12 @@ ones, which take longer, only where the coarser do not bear out the expected vol
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """A solid made from a host by new faces in place of one.
+    """A solid made from a host by new faces in place of old ones.
 
     base: the surface for height 0. volume_expected: what the change should add, below 0 for a groove.
     """
 
-    host: TopoDS_Shape
-    face: TopoDS_Face
+    old: tuple[TopoDS_Face, ...]
     solid: TopoDS_Solid
     new: tuple[TopoDS_Face, ...]
     base: Surface
@@ -51,7 +53,7 @@ class Change:
 
     @cached_property
     def volume_added(self) -> float:
-        """Volume between the new faces and the old one, as OCCT integrates it.
+        """Volume between the new faces and the old ones, as OCCT integrates it.
 
         The host's other faces are the same before and after, so their part cancels and is left out.
         The cones to the faces start from a point near by, off the base: a face that runs through the point
@@ -62,7 +64,9 @@ class Change:
         near = gp_Pnt(*(self.base(u, v) - 0.25 * self.breadth * self.base.normal(u, v)).tolist())
         got = 0.0
         for accuracy in INTEGRATION:
-            got = sum(_cone(f, near, accuracy) for f in self.new) - _cone(self.face, near, accuracy)
+            got = sum(_cone(f, near, accuracy) for f in self.new) - sum(
+                _cone(f, near, accuracy) for f in self.old
+            )
             if abs(got - self.volume_expected) <= 0.5 * self.volume_error:
                 break
         return got

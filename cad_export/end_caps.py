@@ -25,7 +25,6 @@ class Lift:
     surface: Surface
     rise: Curve
     distance: float
-    flux: float
 
 
 def lifts(row: Curve, base: Curve, least: float) -> list[Lift]:
@@ -91,12 +90,22 @@ def _lift(row: Curve, base: Curve, a: float, b: float) -> Lift:
     rise = Curve(interpolate(fine, 3, (at * along).sum(1) / (along**2).sum(1))[:, None], fine, 3)
     off = np.linalg.norm((basis @ up) * rise(t) - gap, axis=1).max()
     off = max(float(off), float(np.linalg.norm(base(t) - basis @ foot, axis=1).max()))
-    between = Surface(
-        np.stack([base.poles, row.poles], axis=1), row.knots, np.array([0.0, 0.0, 1.0, 1.0]), row.degree, 1
-    )
-    return Lift((a, b), surface, rise, off, between.flux())
+    return Lift((a, b), surface, rise, off)
 
 
 def _halved(breaks: Floats, parts: int) -> Floats:
     at = np.arange(parts * (len(breaks) - 1) + 1) / parts
     return np.interp(at, np.arange(len(breaks)), breaks)
+
+
+def caps_flux(surface: Surface, base: Surface) -> float:
+    """The part of the caps in the integral for the volume: ruled faces from the base's end rows to the ridge's."""
+    if surface.closed[0]:
+        return 0.0
+    up = np.array([0.0, 0.0, 1.0, 1.0])
+    ends = (
+        Surface(np.stack([base.poles[k], surface.poles[k]], axis=1), base.knots_v, up, base.degree_v, 1)
+        for k in (0, -1)
+    )
+    first, last = (end.flux() for end in ends)
+    return last - first

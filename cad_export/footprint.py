@@ -28,9 +28,9 @@ from OCP.GeomAPI import GeomAPI
 from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Wire
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 
+from cad_export.certificate import subshapes
 from cad_export.geometry import to_occt
 from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interpolate
 
@@ -179,27 +179,29 @@ def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
 def wires_of(face: TopoDS_Face) -> list[TopoDS_Wire]:
     """The wires of a face, the outer one first."""
     outer = BRepTools.OuterWire_s(face)
-    found = []
-    explorer = TopExp_Explorer(face, TopAbs_WIRE)
-    while explorer.More():
-        wire = TopoDS.Wire_s(explorer.Current())
-        found.insert(0, wire) if wire.IsSame(outer) else found.append(wire)
-        explorer.Next()
-    return found
+    wires = [TopoDS.Wire_s(w) for w in subshapes(face, TopAbs_WIRE)]
+    return sorted(wires, key=lambda wire: not wire.IsSame(outer))
 
 
 def segments_of(wire: TopoDS_Wire, face: TopoDS_Face) -> Floats:
     """(n, 2, 2) straight pieces along a wire in the face's parameters."""
-    pieces = []
-    explorer = TopExp_Explorer(wire, TopAbs_EDGE)
-    while explorer.More():
-        curve = BRepAdaptor_Curve2d(TopoDS.Edge_s(explorer.Current()), face)
-        count = 1 if curve.GetType() == GeomAbs_Line else 8 + 4 * curve.NbKnots() if _is_spline(curve) else 64
-        t = np.linspace(curve.FirstParameter(), curve.LastParameter(), count + 1).tolist()
-        line = np.array([(p.X(), p.Y()) for p in map(curve.Value, t)])
-        pieces.append(np.stack([line[:-1], line[1:]], axis=1))
-        explorer.Next()
+    pieces = [_segments(TopoDS.Edge_s(e), face) for e in subshapes(wire, TopAbs_EDGE)]
     return np.concatenate(pieces) if pieces else np.empty((0, 2, 2))
+
+
+def _segments(edge: TopoDS_Edge, face: TopoDS_Face) -> Floats:
+    curve = BRepAdaptor_Curve2d(edge, face)
+    count = 1 if curve.GetType() == GeomAbs_Line else 8 + 4 * curve.NbKnots() if _is_spline(curve) else 64
+    t = np.linspace(curve.FirstParameter(), curve.LastParameter(), count + 1).tolist()
+    line = np.array([(p.X(), p.Y()) for p in map(curve.Value, t)])
+    return np.stack([line[:-1], line[1:]], axis=1)
+
+
+def seams_of(face: TopoDS_Face) -> Floats:
+    """(n, 2, 2) straight pieces along the seams of a face, on both sides of it."""
+    edges = (TopoDS.Edge_s(e) for wire in wires_of(face) for e in subshapes(wire, TopAbs_EDGE))
+    lines = [_segments(e, face) for e in edges if BRep_Tool.IsClosed_s(e, face)]
+    return np.concatenate(lines) if lines else np.empty((0, 2, 2))
 
 
 def _is_spline(curve: BRepAdaptor_Curve2d) -> bool:

@@ -31,7 +31,8 @@ from OCP.TopoDS import (
 )
 
 from cad_export.certificate import Change, certify, subshapes
-from cad_export.end_caps import Lift, lifts
+from cad_export.end_caps import Lift, caps_flux, lifts
+from cad_export.fallbacks import sunk_fuse
 from cad_export.footprint import (
     HostSurface,
     OnHost,
@@ -40,6 +41,7 @@ from cad_export.footprint import (
     inside,
     meetings,
     on_host,
+    seams_of,
     segments_of,
     signed_area,
     surface_on,
@@ -109,10 +111,13 @@ def inset(
     placed = _face_of(host, face)
     _check_pair(surface, base)
     _check_folds(surface, base)
-    change = _build(host, placed, surface, base)
-    certify(change, thorough=check)
+    try:
+        change, method = _build(host, placed, surface, base), "inset"
+        certify(change, thorough=check)
+    except SeamError:
+        change, method = sunk_fuse(host, surface, base, check), "sunk fuse"
     return change.solid, InsetReport(
-        "inset",
+        method,
         change.volume_added,
         change.volume_expected,
         change.largest_tolerance,
@@ -211,8 +216,8 @@ def _build(host: TopoDS_Shape, face: TopoDS_Face, surface: Surface, base: Surfac
     _check_loops(pairs)
     new = [maker.ridge_face(loops), *maker.caps(loops), *_split_face(face, maker.own, pairs)]
     solid = _replaced(host, face, new)
-    expected = surface.flux() - base.flux() + maker.caps_flux
-    return Change(host, face, solid, tuple(new), base, expected)
+    expected = surface.flux() - base.flux() + caps_flux(surface, base)
+    return Change((face,), solid, tuple(new), base, expected)
 
 
 @dataclass(frozen=True)
@@ -234,8 +239,6 @@ class _Maker:
         self.low_geometry = to_occt(base)
         self.size = float(np.ptp(base.poles, axis=(0, 1)).max())
         self.breadth = float(np.linalg.norm(base.poles[:, 0] - base.poles[:, -1], axis=1).max())
-        self.caps_flux = 0.0
-        self.wide = 0.0
 
     def vertex(self, point: Floats, tolerance: float = DEGENERATE) -> TopoDS_Vertex:
         v = TopoDS_Vertex()
@@ -292,7 +295,6 @@ class _Maker:
                 foot = self.edge(self.low_geometry.UIso(u[k]), span, pair)
                 piece = replace(piece, curve=low, lift=found[i // 2], foot=foot)
             pieces.append(piece)
-            self.caps_flux += (-1 if k == 0 else 1) * found[i // 2].flux if i % 2 else 0.0
         return pieces if k else pieces[::-1]
 
     def open_border(self) -> list[_Piece]:
@@ -421,6 +423,9 @@ def _split_face(
             "surface: expected du x dv away from the host's material, it points inwards; turn the surface round"
         )
     everything = np.concatenate([segments for _, segments in own])
+    seams = seams_of(face)
+    if len(seams) and any(cross(_pieces_of(loop.polyline), seams) for loop in loops):
+        raise SeamError("surface: expected a border clear of the face's seam, it runs over it")
     lines = [
         np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in (loop.polyline for loop in loops)
     ]

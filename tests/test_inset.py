@@ -198,3 +198,12 @@ def test_an_open_mesh_is_found() -> None:
     assert free_mesh_edges(host.wrapped) == 0
     opened = cq.Shell.makeShell(host.Faces()[:5])
     assert free_mesh_edges(opened.wrapped) == 4
+
+
+@pytest.mark.parametrize("h", [1.5, -1.0])
+def test_over_a_seam_a_sunk_block_is_fused(h: float) -> None:
+    host = cylinder().rotate(cq.Vector(0, 0, 0), cq.Vector(1, 0, 0), 180)
+    solid, report = inset(host.wrapped, curved_face(host), *carried(h, cylinder_map(20.0)))
+    assert report.method == "sunk fuse"
+    added = volume(solid, 1e-7) - volume(host.wrapped, 1e-7)
+    assert added == pytest.approx(report.volume_expected, rel=1e-3)
