@@ -57,8 +57,8 @@ def bounds(path: Path) -> np.ndarray:
 
 
 def box(shape: cq.Shape) -> np.ndarray:
-    b = shape.BoundingBox(1e-3)
-    return np.array([[b.xmin, b.ymin, b.zmin], [b.xmax, b.ymax, b.zmax]])
+    points = np.array([v.toTuple() for v in shape.copy().tessellate(1e-2)[0]])
+    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 @pytest.mark.parametrize("suffix", [s for s in SUFFIXES if s not in (".3mf",)])
@@ -67,7 +67,7 @@ def test_every_format_holds_the_shape_in_its_unit(slab: cq.Solid, tmp_path: Path
     got, wanted = bounds(path), box(slab)
     if suffix in (".glb", ".gltf"):  # metres, y up
         got = 1000 * np.stack([got[:, 0], -got[::-1, 2], got[:, 1]], axis=-1)
-    np.testing.assert_allclose(got, wanted, atol=0.05)
+    np.testing.assert_allclose(got, wanted, atol=0.02)
     assert all(p.name.startswith("part.") or p.name.endswith(".bin") for p in tmp_path.iterdir())
 
 
@@ -79,7 +79,7 @@ def test_3mf_holds_the_triangles(slab: cq.Solid, tmp_path: Path) -> None:
         model = archive.read("3D/3dmodel.model").decode()
     assert 'unit="millimeter"' in model
     xyz = np.array(re.findall(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)"', model), dtype=float)
-    np.testing.assert_allclose([xyz.min(axis=0), xyz.max(axis=0)], box(slab), atol=0.05)
+    np.testing.assert_allclose([xyz.min(axis=0), xyz.max(axis=0)], box(slab), atol=0.02)
 
 
 def test_a_ridge_in_metres_is_written_in_millimetres(ridge: rf.Ridge, tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_occt_is_silent_and_its_settings_are_restored(
         for suffix in SUFFIXES:
             cx.write(slab, tmp_path / f"a{suffix}")
         assert Interface_Static.CVal_s("write.iges.unit") == "INCH"
-        np.testing.assert_allclose(bounds(tmp_path / "a.iges"), box(slab), atol=0.05)
+        np.testing.assert_allclose(bounds(tmp_path / "a.iges"), box(slab), atol=0.02)
     finally:
         Interface_Static.SetCVal_s("write.iges.unit", "MM")
     assert Message.DefaultMessenger_s().Printers().Size() == printers > 0
@@ -126,9 +126,7 @@ def test_the_shape_keeps_its_own_triangles(tmp_path: Path) -> None:
 
 
 def test_bad_targets_are_told(slab: cq.Solid, tmp_path: Path) -> None:
-    with pytest.raises(
-        ValueError, match=r"a\.dwg: expected one of the suffixes \.step \.stp \.iges .*'\.dwg'"
-    ):
+    with pytest.raises(ValueError, match=r"a\.dwg: expected one of .* \.step \.stp .*'\.dwg'"):
         cx.write(slab, tmp_path / "a.dwg")
     with pytest.raises(ValueError, match="got ''"):
         cx.write(slab, tmp_path / "a")

@@ -366,7 +366,8 @@ def test_gmsh_opens_the_files(ridge: rf.Ridge, slab: cq.Solid, tmp_path: Path, s
         path, counts = cx.step(source, tmp_path / f"{name}.step", schema=schema), tmp_path / f"{name}.txt"
         script = tmp_path / f"{name}.geo"
         script.write_text(
-            f'Merge "{path}"; v() = Volume{{:}}; s() = Surface{{:}}; Printf("%g %g", #v(), #s()) > "{counts}";'
+            f'Merge "{path}";\nv() = Volume{{:}}; s() = Surface{{:}};\n'
+            f'Printf("%g %g", #v(), #s()) > "{counts}";\n'
         )
         words = ["gmsh", "-0", str(script), "-o", str(tmp_path / "out.geo_unrolled")]
         done = subprocess.run(words, capture_output=True, text=True, check=True)
