@@ -81,6 +81,8 @@ class FaceBase:
             raise ValueError(
                 f"expected finite y and arc lengths s from 0 to {self.length:g}; stay on the path"
             )
+        if not y.any():  # the path itself
+            return np.repeat(self.path(np.clip(s, 0.0, self.length))[0][:, None], y.shape[1], axis=1)
         reach, coefficients = self._polynomials(s, np.abs(y).max(axis=1))
         powers = np.polynomial.chebyshev.chebvander(y / reach[:, None], _DEGREE)
         return np.asarray(np.matmul(powers, coefficients), dtype=np.float64)

@@ -79,7 +79,7 @@ def grid(base, n: int = 41, m: int = 9):
     return s, base.breadth(s)[:, None] * np.linspace(-1, 1, m)
 
 
-def path_points(base, n: int = 801) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def path_points(base, n: int = 401) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Arc lengths, points and normals of the path."""
     s = np.linspace(0, base.length, n)
     points, normals = base(s, np.zeros((n, 1)))
