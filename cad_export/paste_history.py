@@ -55,6 +55,7 @@ class _Part:
     volume: float
     host: dict[str, Any]
     pastes: int
+    tshape: Any = None
 
 
 _PARTS: OrderedDict[int, _Part] = globals().get("_PARTS", OrderedDict())
@@ -89,7 +90,8 @@ def remember(
 
 
 def _keep(part: _Part) -> None:
-    _PARTS[id(part.shape.TShape())] = part
+    tshape = part.shape.TShape()
+    _PARTS[id(tshape)] = replace(part, tshape=tshape)
     while len(_PARTS) > _KEPT:
         _PARTS.popitem(last=False)
 

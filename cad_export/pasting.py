@@ -22,6 +22,7 @@ from cad_export.geometry import topods
 from cad_export.inset import face_with, inset
 from cad_export.paste_history import Placement, remember
 from ridgefeature.bspline import Surface
+from ridgefeature.fitting import FITS
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import millimetres_per
 
@@ -59,6 +60,8 @@ def paste(
     closed mesh. report: filled with method, volumes, largest tolerance and seconds. name: that of the ridge's
     face in STEP files. Raises ValueError that says what to change.
     """
+    if fit not in FITS:
+        raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
     solid = _solid_of(host)
     chosen = _face_of(solid, face, path, at)
     stand = _stand(_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse)

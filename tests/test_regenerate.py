@@ -1,0 +1,86 @@
+"""Regenerating: a pasted part made again at other heights and widths, from the part or its STEP file."""
+
+from __future__ import annotations
+
+import cadquery as cq
+import pytest
+from oracles import spiral_ridge
+
+import cad_export as cx
+import ridgefeature as rf
+
+
+@pytest.fixture(scope="module")
+def ridge() -> rf.Ridge:
+    return spiral_ridge().stretched(40.0, "trim")
+
+
+@pytest.fixture(scope="module")
+def host() -> cq.Solid:
+    return cq.Workplane().box(120, 80, 10).edges("|Z").fillet(5).val()
+
+
+@pytest.fixture(scope="module")
+def part(ridge, host) -> cq.Solid:
+    once = cx.paste(ridge, host, at=(-20, 0, 5), direction=(0, 1, 0), h=1.2, check=False)
+    path = cq.Edge.makeSpline([cq.Vector(15, -25, 5), cq.Vector(25, 0, 5), cq.Vector(20, 25, 5)])
+    return cx.paste(ridge, once, path=path, w=0.9, check=False)
+
+
+def volume_added(part: cq.Solid, host: cq.Solid) -> float:
+    return part.Volume(1e-6) - host.Volume(1e-6)
+
+
+def test_the_same_rates_give_the_same_part(part):
+    assert cx.regenerate(part, check=False).Volume(1e-6) == pytest.approx(part.Volume(1e-6), rel=1e-9)
+
+
+def test_all_ridges_change_or_the_named_one(part, host, ridge):
+    both = cx.regenerate(part, h=2, check=False)
+    names = [record.name for _, record in cx.carried_by(part)]
+    assert len(names) == 2
+    ones = [record for _, record in cx.carried_by(both)]
+    assert [record.h for record in ones] == [2, 2]
+    assert sorted(record.w for record in ones) == [0.9, 1.0]
+
+
+def test_a_step_file_regenerates(part, host, tmp_path):
+    file = cx.step(part, tmp_path / "part.step")
+    again = cx.regenerate(file, check=False)
+    assert volume_added(again, host) == pytest.approx(volume_added(part, host), rel=1e-4)
+    name = cx.carried_in(file)[1].name
+    changed = cx.regenerate(file, h=3, name=name, check=False)
+    assert sorted(record.h for _, record in cx.carried_by(changed)) == [1.2, 3]
+    # and what was regenerated can be written and regenerated again
+    twice = cx.regenerate(cx.step(changed, tmp_path / "again.step"), h=1, check=False)
+    assert [record.h for _, record in cx.carried_by(twice)] == [1, 1]
+
+
+def test_the_ridges_come_back_from_a_part(part, ridge, tmp_path):
+    first, second = cx.load(cx.step(part, tmp_path / "part.step"))
+    for found in (first, second):
+        assert (found.height == ridge.height).all() and (found.arc_length == ridge.arc_length).all()
+
+
+def test_a_moved_part_regenerates_where_it_is(part):
+    moved = part.moved(cq.Location(cq.Vector(7, -3, 11), cq.Vector(0, 1, 1), 40))
+    again = cx.regenerate(moved, check=False)
+    assert (again.Center() - moved.Center()).Length < 1e-6
+
+
+def test_a_part_that_was_changed_since_is_refused(part):
+    with pytest.raises(ValueError, match="changed"):
+        cx.regenerate(cq.Workplane(part).faces("<Z").workplane().hole(3))
+
+
+def test_what_cannot_be_regenerated_says_why(part, host, ridge, tmp_path):
+    with pytest.raises(ValueError, match="pasted ridge"):
+        cx.regenerate(host)
+    with pytest.raises(ValueError, match="carries no ridge feature"):
+        cx.regenerate(cx.step(host, tmp_path / "host.step"))
+    with pytest.raises(ValueError, match="pasted ridge"):
+        cx.regenerate(cx.step(ridge, tmp_path / "ridge.step"))
+    with pytest.raises(ValueError, match="name: expected one of"):
+        cx.regenerate(part, h=2, name="bead")
+    with pytest.raises(OSError):
+        cx.regenerate(tmp_path / "none.step")
