@@ -114,8 +114,9 @@ def add_properties(model: Any, values: list[tuple[str, str]]) -> None:
         represented, whole = StepRepr_RepresentedDefinition(), StepRepr_PropertyDefinitionRepresentation()
         represented.SetValue(definition)
         whole.Init(represented, representation)
-        for entity in (whole, link):
-            model.AddWithRefs(entity)
+        # all that is new, by itself: AddWithRefs searches the whole model each time
+        for entity in (item, representation, definition, whole, general, link):
+            model.AddEntity(entity)
 
 
 def name_products(model: Any, name: str) -> None:
