@@ -33,7 +33,7 @@ VOLUME = 1e-3
 """Largest relative error of the volume added."""
 TOLERANCE = 5e-4
 """Largest tolerance of an edge, as a part of the ridge's breadth."""
-INTEGRATION = (1e-4, 1e-6, 1e-8)
+INTEGRATION = (1e-3, 1e-5, 1e-7)
 """Relative accuracies asked of OCCT's integration, whose default fails on faces with long holes; the finer
 ones, which take longer, only where the coarser do not bear out the expected volume."""
 
@@ -158,8 +158,8 @@ def check_shape(solid: TopoDS_Shape) -> None:
 def free_mesh_edges(shape: TopoDS_Shape) -> int:
     """How many directed sides of triangles have no partner in OCCT's mesh of a shape; 0 for a closed one.
 
-    A copy is meshed, so the shape stays as it is. Nodes are told to be the same by the edges that faces share,
-    not by their place.
+    A copy is meshed, so the shape stays as it is. Nodes are told to be the same by the edges that
+    faces share, not by their place.
     """
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)

@@ -30,7 +30,8 @@ class Lift:
 def lifts(row: Curve, base: Curve, least: float) -> list[Lift]:
     """The stretches of a ridge's end row that are off the base's row, in ascending order.
 
-    Both rows have the same knots. A row is off the base where their distance is `least` or more. Where their distance changes its sign a stretch ends and the next begins.
+    Both rows have the same knots. A row is off the base where their distance is `least` or more. Where their
+    distance changes its sign a stretch ends and the next begins.
     """
     return [_lift(row, base, a, b) for a, b in _stretches(row, base, least)]
 
@@ -99,7 +100,7 @@ def _halved(breaks: Floats, parts: int) -> Floats:
 
 
 def caps_flux(surface: Surface, base: Surface) -> float:
-    """The part of the caps in the integral for the volume: ruled faces from the base's end rows to the ridge's."""
+    """The caps' part in the volume: ruled faces from the base's end rows to the ridge's."""
     if surface.closed[0]:
         return 0.0
     up = np.array([0.0, 0.0, 1.0, 1.0])

@@ -1,4 +1,4 @@
-"""A closed loop of curves on a face of the host: parameters, parameter curves, and what the loop must not cross.
+"""A loop of curves on a face of the host: parameters, parameter curves, and what it must not cross.
 
 OCP only, no cadquery.
 """

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,8 +190,8 @@ def _check_folds(surface: Surface, base: Surface) -> None:
     )
     if not (np.einsum("mkd,mkd->mk", cross_above, cross_below) > 0).all():
         raise ValueError(
-            "surface: expected one that does not fold over itself, it does; use a lower height or a path with "
-            "wider bends"
+            "surface: expected one that does not fold over itself, it does; use a lower height or "
+            "a path with wider bends"
         )
 
 
@@ -287,7 +288,7 @@ class _Maker:
         vertices = [ends[0], *middle, ends[1]]
         line = Geom2d_Line(gp_Pnt2d(u[k], 0.0), gp_Dir2d(0, 1))
         pieces = []
-        for i, span in enumerate(zip(breaks[:-1], breaks[1:], strict=True)):
+        for i, span in enumerate(pairwise(breaks)):
             pair = vertices[i], vertices[i + 1]
             edge = self.edge(self.geometry.UIso(u[k]), span, pair)
             piece = _Piece(edge, line, row, span, k != 0)
@@ -420,7 +421,8 @@ def _split_face(
     outer = int(np.argmax(np.abs(areas)))
     if areas[outer] > 0:
         raise ValueError(
-            "surface: expected du x dv away from the host's material, it points inwards; turn the surface round"
+            "surface: expected du x dv away from the host's material, "
+            "it points inwards; turn the surface round"
         )
     everything = np.concatenate([segments for _, segments in own])
     seams = seams_of(face)
