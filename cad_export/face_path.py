@@ -140,21 +140,24 @@ def developed_path(host: Host, ridge: Stations, at: Floats, tangent: Floats) -> 
     stations = len(ridge.arc_length) - 1
     n = stations // 2 if stations % 2 == 0 else stations
     n, before = n * max(1, int(np.ceil(half / (0.25 * width * n)))), None
-    for round_ in range(8):
+    for _ in range(8):
         places = np.linspace(0.0, half, 2 * n + 1)
         turns = geodesic_curvature(ridge, np.concatenate([half - places[::-1], half + places[1:]]))
         # backwards, what lay to the left lies to the right
         curvature = np.stack([turns[2 * n :], -turns[2 * n :: -1]], axis=1)
         with np.errstate(all="ignore"):
-            x, speed = follow(host, start, rates, np.full((n, 2), half / n), curvature)
-            if settled(host, x[::2], before, width, round_):
+            found = follow(host, start, rates, np.full((n, 2), half / n), curvature)
+            if before is not None and moved(host, found[0][::2], before[0]) <= 100 * _CLOSE * width:
                 break
-        n, before = 2 * n, x
+        n, before = 2 * n, found
     else:
         raise ValueError(
             "expected a face on which the path can be followed, it does not settle; "
             "keep it away from poles and from creases of the surface"
         )
+    # Richardson's extrapolation: halving the steps left a sixteenth of the error
+    x, speed = (a[::2] + (a[::2] - b) / 15 for a, b in zip(found, before, strict=True))
+    n, curvature = n // 2, curvature[::2]
     bend = np.stack([acceleration(host, x[:, i], speed[:, i], curvature[::2, i]) for i in (0, 1)], axis=1)
     forth = [a[:, 0] for a in (x, speed, bend)]
     back = [sign * a[:0:-1, 1] for a, sign in ((x, 1), (speed, -1), (bend, 1))]
