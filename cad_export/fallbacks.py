@@ -16,7 +16,7 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
 
 from cad_export.certificate import Change, certify, subshapes
-from cad_export.end_caps import caps_flux
+from cad_export.end_caps import volume_between
 from cad_export.geometry import DEGENERATE, make_face
 from cad_export.slab import _sides, _up
 from ridgefeature.bspline import Surface
@@ -70,7 +70,7 @@ def _attempt(
     before, after = subshapes(host, TopAbs_FACE), subshapes(solids[0], TopAbs_FACE)
     new = tuple(TopoDS.Face_s(f) for f in after if not any(f.IsSame(g) for g in before))
     old = tuple(TopoDS.Face_s(f) for f in before if not any(f.IsSame(g) for g in after))
-    expected = surface.flux() - base.flux() + caps_flux(surface, base)
+    expected = volume_between(surface, base)
     change = Change(old, TopoDS.Solid_s(solids[0]), new, base, expected)
     certify(change, thorough=check)
     return change

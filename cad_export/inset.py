@@ -32,7 +32,7 @@ from OCP.TopoDS import (
 )
 
 from cad_export.certificate import Change, certify, subshapes
-from cad_export.end_caps import Lift, caps_flux, lifts
+from cad_export.end_caps import Lift, lifts, volume_between
 from cad_export.fallbacks import sunk_fuse
 from cad_export.footprint import (
     HostSurface,
@@ -111,9 +111,9 @@ def inset(
     start = time.perf_counter()
     placed = _face_of(host, face)
     _check_pair(surface, base)
-    _check_folds(surface, base)
+    expected = volume_between(surface, base)
     try:
-        change, method = _build(host, placed, surface, base), "inset"
+        change, method = _build(host, placed, surface, base, expected), "inset"
         certify(change, thorough=check)
     except SeamError:
         change, method = sunk_fuse(host, surface, base, check), "sunk fuse"
@@ -180,21 +180,6 @@ def _check_pair(surface: Surface, base: Surface) -> None:
         )
 
 
-def _check_folds(surface: Surface, base: Surface) -> None:
-    """Raise ValueError where the surface turns over above its base: its normal points below it."""
-    (u0, u1), (v0, v1) = surface.domain
-    u = np.linspace(u0, u1, 2 * surface.poles.shape[0] + 1)
-    v = np.linspace(v0, v1, 2 * surface.poles.shape[1] + 1)
-    cross_above, cross_below = (
-        np.cross(s.on_grid(u, v, (1, 0)), s.on_grid(u, v, (0, 1))) for s in (surface, base)
-    )
-    if not (np.einsum("mkd,mkd->mk", cross_above, cross_below) > 0).all():
-        raise ValueError(
-            "surface: expected one that does not fold over itself, it does; use a lower height or "
-            "a path with wider bends"
-        )
-
-
 def _check_loops(loops: list[_Loop]) -> None:
     """Raise ValueError where the border crosses itself."""
     lines = [_pieces_of(loop.polyline[:: 1 + len(loop.polyline) // 200]) for loop in loops]
@@ -210,14 +195,13 @@ def _pieces_of(line: Floats) -> Floats:
     return np.stack([line, np.roll(line, -1, axis=0)], axis=1)
 
 
-def _build(host: TopoDS_Shape, face: TopoDS_Face, surface: Surface, base: Surface) -> Change:
+def _build(host: TopoDS_Shape, face: TopoDS_Face, surface: Surface, base: Surface, expected: float) -> Change:
     maker = _Maker(surface, base, surface_on(face), face)
     loops = maker.ring() if surface.closed[0] else [maker.open_border()]
     pairs = [maker.hole(loop) for loop in loops]
     _check_loops(pairs)
     new = [maker.ridge_face(loops), *maker.caps(loops), *_split_face(face, maker.own, pairs)]
     solid = _replaced(host, face, new)
-    expected = surface.flux() - base.flux() + caps_flux(surface, base)
     return Change((face,), solid, tuple(new), base, expected)
 
 
