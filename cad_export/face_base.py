@@ -106,6 +106,10 @@ class FaceBase:
         ahead = rate[:, :1] * pu + rate[:, 1:] * pv
         left = np.cross(self.host.normal(pu, pv), ahead)
         aside = self.host.parameters(left / np.linalg.norm(left, axis=1, keepdims=True), pu, pv)
+        if self.host.straight:
+            line = np.zeros((len(s), _DEGREE + 1, 2))
+            line[:, 0], line[:, 1] = x, reach[:, None] * aside
+            return reach, line
         start, rates = np.concatenate([x, x]), np.concatenate([aside, -aside])
         half = _DEGREE // 2
         nodes = np.sin(0.5 * np.pi * np.arange(half + 1) / half)  # Chebyshev points, from 0 to 1

@@ -76,6 +76,8 @@ def acceleration(host: Host, x: Floats, rate: Floats, curvature: Any = 0.0) -> F
     """(m, 2): second derivatives of the parameters along curves of that geodesic curvature (m,)."""
     _, pu, pv, puu, puv, pvv = host.jet(x[:, 0], x[:, 1])
     a, b = rate[:, :1], rate[:, 1:]
+    if host.straight:
+        return np.asarray(curvature)[..., None] * host.left(rate, pu, pv)
     straight = host.parameters(-(a * a * puu + 2 * a * b * puv + b * b * pvv), pu, pv)
     return (
         straight + np.asarray(curvature)[..., None] * host.left(rate, pu, pv)

@@ -47,6 +47,8 @@ class Host:
     """1 where the face's outward normal is du x dv, else -1."""
     tangents: Evaluator | None = None
     """Only P, Pu and Pv, where they are cheaper."""
+    straight: bool = False
+    """Whether geodesics are straight lines in u and v, as on planes and cylinders."""
 
     def points(self, u: Floats, v: Floats) -> Floats:
         """Points (..., 3)."""
@@ -106,7 +108,8 @@ def host_of(face: TopoDS_Face) -> Host:
     jet = _jet(adaptor, periods)
     if jet is None:
         return Host(face, _one_by_one(adaptor, 2), periods, outward, _one_by_one(adaptor, 1))
-    return Host(face, jet, periods, outward)
+    straight = adaptor.GetType() in (GeomAbs_Plane, GeomAbs_Cylinder)
+    return Host(face, jet, periods, outward, straight=straight)
 
 
 def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Evaluator | None:
