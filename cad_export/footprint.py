@@ -150,10 +150,10 @@ def on_host(
             uv[:, k] += period * np.round(shift[k] / period)
     poles = interpolate(knots, curve.degree, uv)
     flat = Curve(poles, knots, curve.degree)
-    inner = _refined(curve.knots, curve.degree, span, 2 * _SPLIT)[curve.degree : -curve.degree]
-    at = np.union1d(inner, 0.5 * (inner[1:] + inner[:-1]))
-    off = np.linalg.norm(host.points(flat(at)) - curve(at), axis=1)
-    line = flat(inner)
+    at = _refined(curve.knots, curve.degree, span, 4 * _SPLIT)[curve.degree : -curve.degree]
+    fine = flat(at)
+    off = np.linalg.norm(host.points(fine) - curve(at), axis=1)
+    line = fine[::2]
     return OnHost(flat, line if forward else line[::-1], float(off.max()))
 
 
