@@ -8,7 +8,7 @@ from typing import Any
 
 import cadquery as cq
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.gp import gp_Pnt
@@ -21,8 +21,10 @@ from cad_export.face_base import FaceBase, face_base
 from cad_export.geometry import topods
 from cad_export.inset import face_with, inset
 from cad_export.paste_history import Placement, remember
+from ridgefeature.base import geodesic_curvature
 from ridgefeature.bspline import Surface
 from ridgefeature.fitting import FITS
+from ridgefeature.merge import LEAST_BORDER
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import millimetres_per
 
@@ -64,7 +66,7 @@ def paste(
         raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
     solid = _solid_of(host)
     chosen = _face_of(solid, face, path, at)
-    stand = _stand(_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse)
+    stand = _stand(_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
     surface, foot = stand.surface(h, w), stand.surface(0, w)
     result, told = inset(solid, chosen, surface, foot, check=check)
     if report is not None:
@@ -101,6 +103,8 @@ class _Stand:
         return x, y, z
 
 
+_UNFOLDED = 0.85
+"""Breadth of a flank in radii of the path's bend."""
 _STANDS: OrderedDict[tuple[Any, ...], _Stand] = OrderedDict()
 _KEPT = 16
 """Stands that are remembered: a slider pastes again and again at one place."""
@@ -116,17 +120,20 @@ def _stand(
     scale: float,
     mirror: bool,
     reverse: bool,
+    w: float,
 ) -> _Stand:
     """The ridge on the face's base along the path, remembered."""
     along = None if path is None else topods(path)
     held = (ridge, face.TShape(), along and along.TShape())
     places = [repr(None if value is None else np.asarray(value).tolist()) for value in (at, direction)]
     locations = [shape and shape.Location().HashCode() for shape in (face, along)]
-    key = (*map(id, held), face.Orientation(), *locations, *places, fit, scale, mirror, reverse)
+    least = min(w, 1.0) if path is None and _is_bent(ridge) else 1.0
+    key = (*map(id, held), face.Orientation(), *locations, *places, fit, scale, mirror, reverse, least)
     if key not in _STANDS:
+        whole = _in_millimetres(ridge, scale)
         base, fitted = face_base(
             face,
-            _in_millimetres(ridge, scale),
+            _narrowed(whole, least) if path is None else whole,
             path=path,
             at=at,
             direction=direction,
@@ -155,6 +162,26 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
         return ridge
     names = ("arc_length", "spine", "height", "width", "height_std", "width_std", "border")
     return replace(ridge, unit="mm", **{name: factor * getattr(ridge, name) for name in names})
+
+
+def _room(ridge: Ridge) -> NDArray[np.float64]:
+    """Breadth (k,) that a flank may have without folding over the path's own bends, three stations around."""
+    bend = np.abs(geodesic_curvature(ridge))
+    near = np.stack([np.roll(bend, i) for i in range(-3, 4)]).max(axis=0)
+    return np.asarray(_UNFOLDED / np.maximum(near, 1e-300), dtype=np.float64)
+
+
+def _is_bent(ridge: Ridge) -> bool:
+    return bool((_room(ridge) < ridge.border).any())
+
+
+def _narrowed(ridge: Ridge, w: float) -> Ridge:
+    """The ridge with narrower flanks where its own path bends so that they would fold.
+
+    Never narrower than the feet need at the rate w.
+    """
+    least = 1.05 * LEAST_BORDER * ridge.width * max(w, 0.0)
+    return replace(ridge, border=np.minimum(ridge.border, np.maximum(_room(ridge), least)))
 
 
 def _solid_of(host: Any) -> TopoDS_Shape:
