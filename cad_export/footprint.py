@@ -27,7 +27,7 @@ from OCP.GeomAdaptor import GeomAdaptor_Surface
 from OCP.GeomAPI import GeomAPI
 from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 
 from cad_export.certificate import subshapes
@@ -177,9 +177,9 @@ def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
 
 
 def wires_of(face: TopoDS_Face) -> list[TopoDS_Wire]:
-    """The wires of a face, the outer one first."""
+    """The wires of a face, the outer one first, oriented as the face holds them, whichever way it faces."""
     outer = BRepTools.OuterWire_s(face)
-    wires = [TopoDS.Wire_s(w) for w in subshapes(face, TopAbs_WIRE)]
+    wires = [TopoDS.Wire_s(w) for w in subshapes(face.Oriented(TopAbs_FORWARD), TopAbs_WIRE)]
     return sorted(wires, key=lambda wire: not wire.IsSame(outer))
 
 
