@@ -52,6 +52,8 @@ class _Layout:
     across: Array
     """(m, section's poles) from control values of a row to its values at the columns' sites."""
     columns_to_poles: Array
+    lift_to_poles: Array
+    """The same for what stands on the base; zero for all poles that bear on anything beyond the feet."""
 
 
 # Kept beside the bases, not in them: a base need be no more than its protocol says.
@@ -75,8 +77,8 @@ def surface_on(base: Base, stations: Stations, section: Section) -> Surface:
     width, border, height = (layout.spread @ x for x in (stations.width, stations.border, stations.height))
     sideways, raised = row_controls(section, width, border, height, layout.flank)
     points, normals = _on(base, layout.s, sideways @ layout.across.T)
-    values = points + (raised @ layout.across.T)[..., None] * normals
-    columns = np.matmul(layout.columns_to_poles, values)
+    lift = (raised @ layout.across.T)[..., None] * normals
+    columns = np.matmul(layout.columns_to_poles, points) + np.matmul(layout.lift_to_poles, lift)
     poles = np.tensordot(layout.rows_to_poles, columns, 1)
     if base.closed:
         poles[-1] = poles[0]
@@ -147,7 +149,23 @@ def _layout(base: Base, stations: Stations, section: Section, flank: float) -> _
         knots_v,
         basis_matrix(section_knots(section, flank), DEGREE, sites),
         np.asarray(np.linalg.inv(basis_matrix(knots_v, DEGREE, sites)), dtype=np.float64),
+        _lift_to_poles(knots_v, sites),
     )
+
+
+def _lift_to_poles(knots: Array, sites: Array) -> Array:
+    """Linear map (n, n) from what stands on the base at the sites to poles, zero outside the feet.
+
+    Least squares by the poles that bear on nothing beyond the feet: an interpolation would leave ripples on
+    the flanks, and these belong to the base.
+    """
+    slack = 1e-9
+    within = (knots[: -DEGREE - 1] > -0.5 - slack) & (knots[DEGREE + 1 :] < 0.5 + slack)
+    between = np.abs(sites) < 0.5
+    basis = basis_matrix(knots, DEGREE, sites)
+    out = np.zeros_like(basis)
+    out[np.ix_(within, between)] = np.linalg.pinv(basis[np.ix_(between, within)])
+    return out
 
 
 def _spread(k: int, n: int, closed: bool) -> Array:
