@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.Geom import Geom_Surface
+from OCP.Geom import Geom_BSplineSurface, Geom_Surface
+from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
@@ -26,6 +27,7 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
+from cad_export import occt_arrays
 from cad_export.certificate import Change, certify, subshapes
 from cad_export.end_caps import volume_between
 from cad_export.fallbacks import sunk_fuse
@@ -92,24 +94,21 @@ def inset(
     )
 
 
-def face_with(solid: TopoDS_Shape, surface: Surface) -> TopoDS_Face:
-    """The face of a solid that lies on exactly this surface (poles to 1e-12 of its size).
+def face_with(solid: TopoDS_Shape, surface: Surface, within: float = 0.0) -> TopoDS_Face:
+    """The face of a solid that lies on exactly this surface (poles to 1e-12 of its size), or `within` of it.
 
-    Raises ValueError when there is none.
+    A fused ridge lies a little off. Raises ValueError when there is none.
     """
-    from OCP.Geom import Geom_BSplineSurface
-
-    size = 1e-12 * float(np.abs(surface.poles).max())
+    most = max(within, 1e-12 * float(np.abs(surface.poles).max()))
     nu, nv, _ = surface.poles.shape
+    corner = gp_Pnt(*surface.poles[0, 0].tolist())
     for found in subshapes(solid, TopAbs_FACE):
         g = BRep_Tool.Surface_s(TopoDS.Face_s(found))
         if not isinstance(g, Geom_BSplineSurface) or (g.NbUPoles(), g.NbVPoles()) != (nu, nv):
             continue
-        poles = [[g.Pole(i, j) for j in range(1, nv + 1)] for i in range(1, nu + 1)]
-        if (
-            np.abs(np.array([[(p.X(), p.Y(), p.Z()) for p in r] for r in poles]) - surface.poles).max()
-            <= size
-        ):
+        if g.Pole(1, 1).Distance(corner) > 2 * most:
+            continue
+        if np.abs(occt_arrays.pole_array(g) - surface.poles).max() <= most:
             return TopoDS.Face_s(found)
     raise ValueError("expected a solid with a face on this surface, got none; paste it first")
 

@@ -73,7 +73,10 @@ def paste(
         report.update(asdict(told))
     options = {"fit": fit, "scale": scale, "mirror": mirror, "reverse": reverse}
     place = Placement(stand.middle, at, direction, path, options, told.volume_added)
-    remember(solid, result, face_with(result, surface), record_of(ridge, h, w, name), place)
+    grown = face_with(
+        result, surface, 0.0 if told.method == "inset" else _SUNK * np.abs(surface.poles - foot.poles).max()
+    )
+    remember(solid, result, grown, record_of(ridge, h, w, name), place)
     return cq.Solid(result)
 
 
@@ -103,6 +106,8 @@ class _Stand:
         return x, y, z
 
 
+_SUNK = 1e-3
+"""How far the face of a fused ridge may lie off its surface, in heights."""
 _UNFOLDED = 0.85
 """Breadth of a flank in radii of the path's bend."""
 _STANDS: OrderedDict[tuple[Any, ...], _Stand] = OrderedDict()
