@@ -14,6 +14,7 @@ SCRIPTS = sorted(path.name for path in FOLDER.glob("*.py") if "__main__" in path
 
 def test_the_examples_are_there() -> None:
     asked = {"spiral.py", "constant_bead.py", "clay.py", "mountain_ridge.py", "resize_and_export.py"}
+    asked |= {"grip.py", "panel_bead.py", "spiral_on_cylinder.py", "laser_bead.py"}
     assert asked <= set(SCRIPTS)
 
 
@@ -30,3 +31,17 @@ def test_example(name: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip(), "an example prints what it found"
     assert list(tmp_path.iterdir()) == [], "an example leaves nothing behind"
+
+
+def test_the_panel_is_a_script_with_parameters() -> None:
+    """In a CQGI host, h and w are parameters, and the part follows them."""
+    from cadquery import cqgi
+
+    model = cqgi.parse((FOLDER / "panel_bead.py").read_text())
+    assert {"h", "w"} <= set(model.metadata.parameters)
+    heights = []
+    for h in (1.0, 2.0):
+        built = model.build({"h": h})
+        assert built.success, built.exception
+        heights.append(built.results[0].shape.val().BoundingBox().zmax - 0.75)
+    assert heights[1] == pytest.approx(2 * heights[0], rel=1e-3)
