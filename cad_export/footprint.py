@@ -5,7 +5,8 @@ OCP only, no cadquery.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import OrderedDict
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +38,9 @@ from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interp
 Floats = NDArray[np.float64]
 
 _SPLIT = 2  # knot spans of a parameter curve for each one of its edge
+_KEPT_CURVES, _KEPT_HOSTS = 64, 8
+_HOSTS: OrderedDict[tuple[int, int], tuple[HostSurface, object]] = OrderedDict()
+"""Host surfaces asked for lately, with the faces' own shapes, held so that their identity stays theirs."""
 _ACROSS = np.array([0.0, 0.0, 1.0, 1.0])
 
 
@@ -45,6 +49,8 @@ class HostSurface:
     """The surface of a host face, placed, with its inverse: parameters of points on it."""
 
     geometry: Geom_Surface
+    known: OrderedDict[tuple[object, ...], OnHost] = field(default_factory=OrderedDict, compare=False)
+    """Curves whose parameter curves were asked for lately: a slider asks for most of them again."""
 
     @cached_property
     def _adaptor(self) -> GeomAdaptor_Surface:
@@ -141,6 +147,18 @@ def on_host(
     start: (2,) parameters from which it goes on where the surface is periodic; the polyline begins there.
     With forward=False it runs against the curve.
     """
+    begin = None if start is None else start.tobytes()
+    key = (curve.poles.tobytes(), curve.knots.tobytes(), span, begin, forward)
+    if key not in host.known:
+        host.known[key] = _on_host(host, curve, span, start, forward)
+        while len(host.known) > _KEPT_CURVES:
+            host.known.popitem(last=False)
+    return host.known[key]
+
+
+def _on_host(
+    host: HostSurface, curve: Curve, span: tuple[float, float], start: Floats | None, forward: bool
+) -> OnHost:
     knots = _refined(curve.knots, curve.degree, span, _SPLIT)
     sites = greville(knots, curve.degree)
     uv = host.parameters(curve(sites))
@@ -245,5 +263,11 @@ def meetings(a: Floats, b: Floats) -> NDArray[np.bool_]:
 
 
 def surface_on(face: TopoDS_Face) -> HostSurface:
-    """The placed surface under a face."""
-    return HostSurface(BRep_Tool.Surface_s(face))
+    """The placed surface under a face; the same one for the same face."""
+    tshape = face.TShape()
+    key = id(tshape), face.Location().HashCode()
+    if key not in _HOSTS:
+        _HOSTS[key] = HostSurface(BRep_Tool.Surface_s(face)), tshape
+        while len(_HOSTS) > _KEPT_HOSTS:
+            _HOSTS.popitem(last=False)
+    return _HOSTS[key][0]

@@ -94,9 +94,10 @@ def inset(
 
 
 def face_with(solid: TopoDS_Shape, surface: Surface, within: float = 0.0) -> TopoDS_Face:
-    """The face of a solid that lies on exactly this surface (35 poles to 1e-12 of its size), or `within` of it.
+    """The face of a solid that lies on exactly this surface, or `within` of it.
 
-    A fused ridge lies a little off. Raises ValueError when there is none.
+    35 poles are compared, to 1e-12 of its size. A fused ridge lies a little off. Raises ValueError when there
+    is none.
     """
     most = max(within, 1e-12 * float(np.abs(surface.poles).max()))
     nu, nv, _ = surface.poles.shape
