@@ -23,8 +23,8 @@ SCALE = 0.7
 def make() -> tuple[cq.Solid, cq.Solid, rf.Ridge]:
     """The cylinder without and with the ridge, and the ridge."""
     ridge = rf.register(Spiral().points(20_000, noise=0.05), at=(28.9, 7.9, 5.8))
-    cylinder = cq.Workplane().cylinder(110, RADIUS)
-    part = cx.paste(ridge, cylinder, at=(-RADIUS, 0, 0), scale=SCALE)
+    cylinder = cq.Workplane().cylinder(80, RADIUS)
+    part = cx.paste(ridge, cylinder, at=(-RADIUS, 0, -20), scale=SCALE)
     return cylinder.val(), part, ridge
 
 
