@@ -93,7 +93,12 @@ def register(**options: Any) -> int:
 @main.command()
 @click.argument("feature", type=_FILE)
 @click.option(
-    "-o", "--output", type=_FILE, required=True, metavar="X.step", help="File to write: .step .stp .brep .stl"
+    "-o",
+    "--output",
+    type=_FILE,
+    required=True,
+    metavar="X.step",
+    help="File to write: .step .stp .iges .igs .brep .stl .3mf .glb .gltf .FCMacro",
 )
 @click.option(
     "--h",

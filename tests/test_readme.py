@@ -74,7 +74,7 @@ def test_the_python_blocks_run(demo: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert len(blocks("python")) >= 3
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), names)
-    for name in ("taller.ridge.json", "taller.step"):
+    for name in ("taller.ridge.json", "taller.step", "part.step", "higher.glb", "ridge.FCMacro"):
         assert (demo / name).stat().st_size > 1000
 
 
@@ -123,8 +123,8 @@ def test_the_settings_are_those_of_the_program() -> None:
 
 
 def test_pictures_and_links_are_there() -> None:
-    links = re.findall(r"\]\(([^)#:]+)\)", TEXT)
-    assert "docs/view.png" in links
+    links = re.findall(r"\]\(([^)#:]+)\)", TEXT) + re.findall(r'src="([^"]+)"', TEXT)
+    assert {"docs/view.png", "docs/panel.png"} <= set(links)
     for link in links:
         assert (ROOT / link).is_file(), link
         assert (ROOT / link).stat().st_size < 400_000, link
