@@ -21,12 +21,11 @@ from OCP.BRepGProp import BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
-from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from cad_export import occt_arrays
-from cad_export.check import is_seam
+from cad_export.check import is_seam, subshapes
 from ridgefeature.bspline import Surface
 
 VOLUME = 1e-3
@@ -94,16 +93,6 @@ def _cone(face: TopoDS_Face, point: gp_Pnt, accuracy: float) -> float:
     """Signed volume between a face and a point."""
     parts = BRepGProp_Face(face), BRepGProp_Domain(face)
     return float(BRepGProp_Vinert(*parts, point, point, accuracy).Mass())
-
-
-def subshapes(shape: TopoDS_Shape, kind: Any) -> list[TopoDS_Shape]:
-    """All sub-shapes of a kind, in order, as oriented within the shape; shared ones come more than once."""
-    found = []
-    explorer = TopExp_Explorer(shape, kind)
-    while explorer.More():
-        found.append(explorer.Current())
-        explorer.Next()
-    return found
 
 
 def certify(change: Change, thorough: bool = True) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from OCP.BOPAlgo import BOPAlgo_CheckResult, BOPAlgo_SelfIntersect
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Check
@@ -26,7 +28,7 @@ def check_solid(shape: TopoDS_Shape, expected_volume: float, crossings: bool = T
     `crossings` also looks for faces that run through each other (BRepAlgoAPI_Check): thorough, and the slow
     part, up to seconds for long ridges.
     """
-    solids, shells = _all(shape, TopAbs_SOLID), _all(shape, TopAbs_SHELL)
+    solids, shells = subshapes(shape, TopAbs_SOLID), subshapes(shape, TopAbs_SHELL)
     if len(solids) != 1:
         raise ValueError(
             f"expected one solid, got {len(solids)}; check that the surface does not touch itself"
@@ -64,7 +66,8 @@ def is_seam(fault: BOPAlgo_CheckResult) -> bool:
     return bool(geometry.IsUClosed() or geometry.IsVClosed())
 
 
-def _all(shape: TopoDS_Shape, kind: object) -> list[TopoDS_Shape]:
+def subshapes(shape: TopoDS_Shape, kind: Any) -> list[TopoDS_Shape]:
+    """All sub-shapes of a kind, in order, as oriented within the shape; shared ones come more than once."""
     found = []
     explorer = TopExp_Explorer(shape, kind)
     while explorer.More():

@@ -15,7 +15,8 @@ from OCP.BRepLib import BRepLib
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
 
-from cad_export.certificate import Change, certify, subshapes
+from cad_export.certificate import Change, certify
+from cad_export.check import subshapes
 from cad_export.end_caps import volume_between
 from cad_export.geometry import DEGENERATE, make_face
 from cad_export.slab import _sides, _up

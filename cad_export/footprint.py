@@ -31,7 +31,7 @@ from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 
-from cad_export.certificate import subshapes
+from cad_export.check import subshapes
 from cad_export.geometry import to_occt
 from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interpolate
 

@@ -27,7 +27,8 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
-from cad_export.certificate import Change, certify, subshapes
+from cad_export.certificate import Change, certify
+from cad_export.check import subshapes
 from cad_export.end_caps import volume_between
 from cad_export.fallbacks import sunk_fuse
 from cad_export.footprint import (

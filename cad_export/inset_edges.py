@@ -21,7 +21,7 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
-from cad_export.certificate import subshapes
+from cad_export.check import subshapes
 from cad_export.end_caps import Lift, lifts
 from cad_export.footprint import (
     HostSurface,

@@ -13,11 +13,11 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
-from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from cad_export.carried import faces_of, record_of
-from cad_export.face_base import FaceBase, face_base
+from cad_export.check import subshapes
+from cad_export.face_base import FaceBase, face_base, vector
 from cad_export.geometry import topods
 from cad_export.inset import face_with, inset
 from cad_export.paste_history import Placement, remember
@@ -192,12 +192,7 @@ def _narrowed(ridge: Ridge, w: float) -> Ridge:
 def _solid_of(host: Any) -> TopoDS_Shape:
     """The only solid in a shape or on a Workplane's stack."""
     shapes = host.vals() if hasattr(host, "vals") else [host]
-    solids = []
-    for shape in shapes:
-        explorer = TopExp_Explorer(topods(shape), TopAbs_SOLID)
-        while explorer.More():
-            solids.append(explorer.Current())
-            explorer.Next()
+    solids = [solid for shape in shapes for solid in subshapes(topods(shape), TopAbs_SOLID)]
     if len(solids) != 1:
         raise ValueError(f"host: expected one solid, got {len(solids)}; make one, or choose one of them")
     return solids[0]
@@ -222,7 +217,4 @@ def _face_of(solid: TopoDS_Shape, face: Any, path: Any, at: ArrayLike | None) ->
 
 
 def _vertex(at: ArrayLike | None) -> TopoDS_Shape:
-    point = np.asarray(at, dtype=np.float64)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise ValueError(f"at: expected three finite numbers x, y, z, got {at!r}")
-    return BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
+    return BRepBuilderAPI_MakeVertex(gp_Pnt(*vector(at, "at").tolist())).Vertex()

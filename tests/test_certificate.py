@@ -12,7 +12,8 @@ from OCP.BRep import BRep_Builder
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_VERTEX
 from OCP.TopoDS import TopoDS, TopoDS_Shell, TopoDS_Solid
 
-from cad_export.certificate import Change, certify, check_shape, free_mesh_edges, subshapes
+from cad_export.certificate import Change, certify, check_shape, free_mesh_edges
+from cad_export.check import subshapes
 from cad_export.end_caps import volume_between
 from cad_export.inset import inset
 
