@@ -121,12 +121,8 @@ def _gltf(shape: TopoDS_Shape, path: Path) -> None:
 
 
 def _macro(ridge: Any, path: Path) -> None:
-    try:
-        from cad_export import freecad
-    except ImportError as error:
-        raise ValueError(
-            f"{path.name}: this release writes no FreeCAD macros; choose another suffix"
-        ) from error
+    from cad_export import freecad
+
     freecad.write_macro(ridge, path)
 
 

@@ -172,7 +172,7 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
 def _room(ridge: Ridge) -> NDArray[np.float64]:
     """Breadth (k,) that a flank may have without folding over the path's own bends, three stations around."""
     bend = np.abs(geodesic_curvature(ridge))
-    near = np.stack([np.roll(bend, i) for i in range(-3, 4)]).max(axis=0)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(bend, 3, mode="edge"), 7).max(axis=1)
     return np.asarray(_UNFOLDED / np.maximum(near, 1e-300), dtype=np.float64)
 
 
