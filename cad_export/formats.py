@@ -23,8 +23,8 @@ from OCP.TColStd import TColStd_IndexedDataMapOfStringString
 from OCP.TopoDS import TopoDS_Shape
 
 from cad_export.occt_session import quiet
+from cad_export.step_document import document
 from cad_export.step_file import shape_in_mm, step
-from cad_export.step_model import ascii_name, document
 from ridgefeature.ridge import Ridge
 
 _CHORD = 1e-4  # of the diagonal: triangles closer to the surface than a scan's noise
@@ -114,7 +114,7 @@ def _gltf(shape: TopoDS_Shape, path: Path) -> None:
         converter.SetInputLengthUnit(0.001)
         converter.SetInputCoordinateSystem(RWMesh_CoordinateSystem.RWMesh_CoordinateSystem_Zup)
         writer.Perform(
-            document(meshed, ascii_name(path.stem)),
+            document(meshed, path.stem),
             TColStd_IndexedDataMapOfStringString(),
             Message_ProgressRange(),
         )

@@ -14,19 +14,21 @@ from typing import Any
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader
 from OCP.StepShape import StepShape_FaceSurface
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
-from cad_export.carried import attach, carried_by, faces_of
+from cad_export.carried import attach, faces_of
 from cad_export.geometry import RidgeLike, make_face, surface_for, topods
 from cad_export.occt_session import quiet
 from cad_export.record import Carried, record_of
-from cad_export.step_model import add_properties, ascii_name, document, name_faces, name_products, named
+from cad_export.step_document import assembly_document, document, features_of, is_assembly
+from cad_export.step_model import add_properties, name_faces, name_products, named
 from cad_export.step_properties import items, records_in
+from cad_export.step_text import directives
 from ridgefeature.bspline import Surface
 
 SCHEMAS = {
@@ -46,8 +48,9 @@ def step(
 
     Takes a Ridge: its exact face at rates h and w, scaled from its unit to millimetres. Or, in millimetres,
     a Surface, a cq.Shape, a Workplane, an Assembly or anything whose `.wrapped` is a TopoDS_Shape.
-    Products bear the file's name; ridge faces are named "ridge", "ridge 2", ... and coloured. Every feature
-    that the shape carries (`carried_by`) goes with it as a user property, for `load` to get back.
+    Products bear the file's name; an Assembly keeps its own names, colours, parts and places. Ridge faces are
+    named "ridge", "ridge 2", ... or as they were pasted, and coloured where their part has no colour. Every
+    feature that the shape carries (`carried_by`) goes with it as a user property, for `load` to get back.
     The schema is one of SCHEMAS. OCCT writes 13 digits. The file is written beside the path and renamed, so
     it is never half there.
     Raises ValueError for an unknown schema or suffix or something that is no shape, OSError when the file
@@ -58,13 +61,15 @@ def step(
         raise ValueError(f"expected a file name that ends in .step or .stp, got {target.name!r}; rename it")
     if not isinstance(schema, str) or schema.upper() not in SCHEMAS:
         raise ValueError(f"expected a schema of {', '.join(SCHEMAS)}, got {schema!r}; choose one")
-    shape = shape_in_mm(ridge_or_shape, h, w)
+    # an assembly keeps its structure; at rates it is refused as any other shape
+    whole = is_assembly(ridge_or_shape) and h == 1 and w == 1
+    source = ridge_or_shape if whole else shape_in_mm(ridge_or_shape, h, w)
     if not target.parent.is_dir():
         raise FileNotFoundError(f"expected a folder to write to, got {str(target.parent)!r}; create it first")
     beside = target.with_name(f".{target.stem}.{os.getpid()}-{threading.get_ident()}.step")
     try:
         beside.touch()  # OCCT says only that it failed; this says why
-        _write(shape, beside, SCHEMAS[schema.upper()], target.stem)
+        _write(source, beside, SCHEMAS[schema.upper()], target.stem)
         os.replace(beside, target)
     finally:
         beside.unlink(missing_ok=True)
@@ -119,7 +124,7 @@ def shape_in_mm(source: Any, h: float = 1, w: float = 1) -> TopoDS_Shape:
         raise ValueError(
             f"expected a Ridge for rates h={h:g}, w={w:g}, got {type(source).__name__}; leave both 1"
         )
-    if hasattr(source, "toCompound"):  # a cq.Assembly
+    if is_assembly(source):
         return topods(source.toCompound())
     if not hasattr(source, "vals"):
         return topods(source)
@@ -139,19 +144,27 @@ def _compound(shapes: list[TopoDS_Shape]) -> TopoDS_Shape:
     return compound
 
 
-def _write(shape: TopoDS_Shape, path: Path, schema: str, name: str) -> None:
-    text = ascii_name(name)
-    features = named(carried_by(shape))
-    settings = {"write.step.schema": schema, "write.step.unit": "MM", "xstep.cascade.unit": "MM"}
+def _write(source: Any, path: Path, schema: str, name: str) -> None:
+    """Write a TopoDS_Shape, or an Assembly with its structure."""
+    text, whole = directives(name), is_assembly(source)
+    settings = {
+        "write.step.schema": schema,
+        "write.step.unit": "MM",
+        "xstep.cascade.unit": "MM",
+        "write.stepcaf.subshapes.name": "On" if whole else "Off",
+    }
+    STEPCAFControl_Controller.Init_s()  # defines the last of them
     with quiet(settings):
+        made = assembly_document(source) if whole else document(source, text)
+        features = named(features_of(made))
         writer = STEPCAFControl_Writer()
-        if not writer.Transfer(document(shape, text), STEPControl_AsIs):
+        if not writer.Transfer(made, STEPControl_AsIs):
             raise ValueError(
                 "expected a shape that STEP can hold, OCCT cannot translate it; check that it is valid"
             )
         inner = writer.ChangeWriter()
         model = inner.Model()
-        name_products(model, text)
+        name_products(model, None if whole else text)
         name_faces(inner.WS().TransferWriter().FinderProcess(), features)
         # faces of one feature, which was cut in two, have one record
         records = list({record.name: record for _, record in features}.values())

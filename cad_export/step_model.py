@@ -1,13 +1,13 @@
-"""What STEP files of ours hold beside the geometry: names, a colour, the feature as a user property."""
+"""What STEP files of ours hold beside the geometry: names, and the feature as a user property."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import count
 from typing import Any
 
 from OCP.BRep import BRep_Tool
-from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
 from OCP.StepBasic import (
     StepBasic_GeneralProperty,
     StepBasic_GeneralPropertyAssociation,
@@ -25,20 +25,13 @@ from OCP.StepRepr import (
     StepRepr_RepresentationContext,
     StepRepr_RepresentedDefinition,
 )
-from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
-from OCP.TDataStd import TDataStd_Name
-from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_COMPOUND
+from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
-from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
+from OCP.TopoDS import TopoDS_Face
 
-from cad_export.carried import carried_by
-from cad_export.occt_arrays import label_sequence, representation_items
+from cad_export.occt_arrays import representation_items
 from cad_export.record import Carried
-
-COLOUR = Quantity_Color(0.85, 0.45, 0.10, Quantity_TOC_sRGB)
-"""Of ridge faces."""
+from cad_export.step_text import directives
 
 
 def named(found: list[tuple[TopoDS_Face, Carried]]) -> list[tuple[TopoDS_Face, Carried]]:
@@ -52,31 +45,10 @@ def named(found: list[tuple[TopoDS_Face, Carried]]) -> list[tuple[TopoDS_Face, C
     for (face, record), surface in zip(found, surfaces, strict=True):
         key = id(surface), tuple(round(x, 9) for row in record.motion for x in row)
         if key not in names:
-            plain = ascii_name(record.name) or "ridge"
-            choices = (plain if n == 1 else f"{plain} {n}" for n in count(1))
-            names[key] = next(name for name in choices if name not in names.values())
+            plain = "".join(c for c in record.name if c.isprintable()) or "ridge"
+            names[key] = unused(plain, names.values())
         out.append((face, replace(record, name=names[key])))
     return out
-
-
-def document(shape: TopoDS_Shape, name: str) -> TDocStd_Document:
-    """An XCAF document of one shape, its name, and a colour for ridge faces; a compound is an assembly."""
-    made = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(made.Main())
-    colours = XCAFDoc_DocumentTool.ColorTool_s(made.Main())
-    top = shapes.AddShape(shape, shape.ShapeType() == TopAbs_COMPOUND)
-    TDataStd_Name.Set_s(top, TCollection_ExtendedString(name))
-    labels = label_sequence()
-    shapes.GetShapes(labels)
-    for label in [labels.Value(i) for i in range(1, labels.Length() + 1)]:
-        if not shapes.IsSimpleShape_s(label):
-            continue
-        part = shapes.GetShape_s(label)
-        for face, _ in carried_by(part):
-            place = label if face.IsSame(part) else shapes.AddSubShape(label, face)
-            if not place.IsNull():
-                colours.SetColor(place, COLOUR, XCAFDoc_ColorSurf)
-    return made
 
 
 def name_faces(process: Any, features: list[tuple[TopoDS_Face, Carried]]) -> None:
@@ -84,11 +56,13 @@ def name_faces(process: Any, features: list[tuple[TopoDS_Face, Carried]]) -> Non
 
     Instances of one part share their faces: the first one's name stays.
     """
+    done: list[Any] = []
     for face, record in features:
         found = [STEPConstruct.FindEntity_s(process, f) for f in (face, face.Located(TopLoc_Location()))]
         for entity in found:
-            if entity is not None and (entity.Name() is None or not entity.Name().ToCString()):
-                entity.SetName(TCollection_HAsciiString(record.name))
+            if entity is not None and not any(entity is other for other in done):
+                entity.SetName(TCollection_HAsciiString(directives(record.name)))
+                done.append(entity)
 
 
 def add_properties(model: Any, values: list[tuple[str, str]]) -> None:
@@ -118,20 +92,28 @@ def add_properties(model: Any, values: list[tuple[str, str]]) -> None:
             model.AddWithRefs(entity)
 
 
-def name_products(model: Any, name: str) -> None:
-    """Name products and instances after the file: OCCT numbers them through the session."""
+def name_products(model: Any, name: str | None) -> None:
+    """Name products and instances after the file; with None they keep the names they have.
+
+    Either way they are numbered here: OCCT counts them through the session.
+    """
     entities = [model.Value(i) for i in range(1, model.NbEntities() + 1)]
     products = [entity for entity in entities if isinstance(entity, StepBasic_Product)]
+    names: list[str] = []
     for n, product in enumerate(products, 1):
-        text = TCollection_HAsciiString(name if len(products) == 1 else f"{name} {n}")
-        product.SetId(text)
-        product.SetName(text)
+        own = name if len(products) == 1 else f"{name} {n}"
+        kept = own if name is not None else product.Name().ToCString()
+        product.SetName(TCollection_HAsciiString(kept))
+        names.append(unused(kept, names))
+        product.SetId(TCollection_HAsciiString(names[-1]))  # one of its own, by ISO 10303-41
     uses = [entity for entity in entities if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence)]
     for n, use in enumerate(uses, 1):
         use.SetId(TCollection_HAsciiString(str(n)))
-        use.SetName(TCollection_HAsciiString(str(n)))
+        if name is not None:
+            use.SetName(TCollection_HAsciiString(str(n)))
 
 
-def ascii_name(name: str) -> str:
-    """The name as OCCT can write it: it puts strings in the file as they are."""
-    return "".join(c if " " <= c <= "~" and c not in "\\'" else "?" for c in name)
+def unused(name: str, used: Collection[str]) -> str:
+    """The name, or the first of "name 2", "name 3", ... that is not used yet."""
+    choices = (name if n == 1 else f"{name} {n}" for n in count(1))
+    return next(choice for choice in choices if choice not in used)
