@@ -15,10 +15,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, astuple, dataclass, replace
+from functools import cache, partial
 from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +45,7 @@ class Host:
     face: cq.Face
     at: tuple[float, float, float]
     direction: tuple[float, float, float]
-    ring: cq.Edge | None
+    ring: cq.Edge
 
 
 def hosts() -> dict[str, Host]:
@@ -54,8 +58,8 @@ def hosts() -> dict[str, Host]:
     cone = cq.Workplane(cq.Solid.makeCone(110, 60, 260))
     sphere = cq.Workplane().sphere(120)
     torus = cq.Workplane(cq.Solid.makeTorus(180, 60))
-    grid = [[cq.Vector(x, y, 8 * np.sin(x / 60) * np.cos(y / 70)) for y in np.linspace(-130, 130, 14)]
-            for x in np.linspace(-130, 130, 14)]  # fmt: skip
+    places = np.linspace(-130, 130, 14).tolist()
+    grid = [[cq.Vector(*on_waves(x, y)) for y in places] for x in places]
     skin = cq.Face.makeSplineApprox(grid, tol=1e-4)
     spline = cq.Workplane(cq.Solid.extrudeLinear(skin, cq.Vector(0, 0, -60)))
     side = np.array([170.0, 0.0, 260.0]) / 2
@@ -71,9 +75,25 @@ def hosts() -> dict[str, Host]:
                      cq.Edge.makeCircle(85, cq.Vector(0, 0, 130))),
         "sphere": Host(sphere.val(), sphere.faces().val(), (0, -120, 0), (1, 0, 0),
                        cq.Edge.makeCircle(60, cq.Vector(0, -(120**2 - 60**2) ** 0.5, 0), cq.Vector(0, 1, 0))),
-        "torus": Host(torus.val(), torus.faces().val(), (0, -240, 0), (1, 0, 0), None),
-        "spline": Host(spline.val(), spline.faces(">Z").val(), (0, 0, 0), (1, 0, 0), None),
+        "torus": Host(torus.val(), torus.faces().val(), (0, -240, 0), (1, 0, 0), ring(on_torus, 40)),
+        "spline": Host(spline.val(), spline.faces(">Z").val(), (0, 0, 0), (1, 0, 0), ring(on_waves, 60)),
     }  # fmt: skip
+
+
+def on_torus(x: float, z: float) -> tuple[float, float, float]:
+    """The point of the torus in front of (x, z)."""
+    return x, -(((180 + (60 * 60 - z * z) ** 0.5) ** 2 - x * x) ** 0.5), z
+
+
+def on_waves(x: float, y: float) -> tuple[float, float, float]:
+    return x, y, float(8 * np.sin(x / 60) * np.cos(y / 70))
+
+
+def ring(lift: Callable[[float, float], tuple[float, float, float]], radius: float) -> cq.Edge:
+    """A circle laid onto a surface."""
+    turns = 2 * np.pi * np.arange(96) / 96
+    points = [lift(radius * float(np.cos(t)), radius * float(np.sin(t))) for t in turns]
+    return cq.Edge.makeSpline([cq.Vector(*p) for p in points], periodic=True)
 
 
 def ridges() -> dict[str, rf.Ridge]:
@@ -114,41 +134,76 @@ def mountain() -> rf.Ridge:
 
 
 @dataclass(frozen=True)
+class Case:
+    """One paste."""
+
+    host: str
+    ridge: str
+    h: float
+    w: float
+
+
+@dataclass(frozen=True)
 class Outcome:
+    """One row of the table."""
+
     host: str
     ridge: str
     h: float
     w: float
     end: str
-    """solid, or the first words of the named error, or the exception's name."""
+    """solid, or the error in words."""
     method: str = ""
     volume_error: float = 0.0
     seconds: float = 0.0
 
 
-def cases() -> Iterator[tuple[str, Host, str, rf.Ridge, float, float]]:
-    all_ridges = ridges()
-    for (name, host), h, w in product(hosts().items(), HEIGHTS, WIDTHS):
-        for ridge_name, ridge in all_ridges.items():
-            yield name, host, ridge_name, ridge, h, w
-        if host.ring is not None:
-            yield name, host, "ring", all_ridges["spiral"], h, w
+def cases() -> list[Case]:
+    names = ("straight", "S", "spiral", "ring", "noisy", "real")
+    return [Case(*case) for case in product(hosts(), names, HEIGHTS, WIDTHS)]
 
 
-def one(name: str, host: Host, ridge_name: str, ridge: rf.Ridge, h: float, w: float) -> tuple[Outcome, Any]:
-    """The outcome of one paste, and its solid."""
-    place = {"path": host.ring} if ridge_name == "ring" else {"at": host.at, "direction": host.direction}
+@cache
+def material() -> tuple[dict[str, Host], dict[str, rf.Ridge]]:
+    """Hosts and ridges, made once a process."""
+    return hosts(), ridges()
+
+
+def pasted(case: Case, check: bool, report: dict[str, Any] | None = None) -> cq.Solid:
+    all_hosts, all_ridges = material()
+    host, ringed = all_hosts[case.host], case.ridge == "ring"
+    place: dict[str, Any] = {"path": host.ring} if ringed else {"at": host.at, "direction": host.direction}
+    ridge = all_ridges["spiral" if ringed else case.ridge]
+    options: dict[str, Any] = {"h": case.h, "w": case.w, "check": check, "report": report}
+    return cx.paste(ridge, host.solid, face=host.face, **options, **place)
+
+
+def outcome_of(case: Case, brep: Path) -> Outcome:
+    """The outcome of one paste; its solid is written to a file."""
     report: dict[str, Any] = {}
     start = time.perf_counter()
     try:
-        solid = cx.paste(ridge, host.solid, face=host.face, h=h, w=w, report=report, **place)
-    except ValueError as error:
-        return Outcome(name, ridge_name, h, w, str(error)[:90]), None
+        solid = pasted(case, True, report)
     except Exception as error:
-        return Outcome(name, ridge_name, h, w, f"{type(error).__name__}: {error}"[:90]), None
-    error = abs(report["volume_added"] / report["volume_expected"] - 1)
+        seconds = time.perf_counter() - start
+        end = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        return Outcome(*astuple(case), end, seconds=seconds)
     seconds = time.perf_counter() - start
-    return Outcome(name, ridge_name, h, w, "solid", report["method"], error, seconds), solid
+    solid.exportBrep(str(brep))
+    error = abs(report["volume_added"] / report["volume_expected"] - 1)
+    return Outcome(*astuple(case), "solid", report["method"], error, seconds)
+
+
+def kept_outcome(case: Case, folder: Path) -> Outcome:
+    """The outcome of one paste, from the folder where it is there."""
+    name = "_".join(str(part).replace(" ", "-") for part in astuple(case))
+    file = folder / f"{name}.json"
+    if file.exists():
+        return Outcome(**json.loads(file.read_text()))
+    outcome = outcome_of(case, folder / f"{name}.brep")
+    file.write_text(json.dumps(asdict(outcome)))
+    print(outcome, file=sys.stderr, flush=True)
+    return outcome
 
 
 FREECAD = """
@@ -164,39 +219,42 @@ with open(OUT, "w") as file:
 """
 
 
-def refused_by_freecad(solids: list[cq.Solid]) -> int | None:
-    """How many of the solids FreeCAD finds faulty; None without FreeCAD."""
+def refused_by_freecad(folder: Path) -> list[str] | None:
+    """The solids in the folder that FreeCAD finds faulty; None without FreeCAD."""
     program = shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
     if program is None:
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [str(Path(folder) / f"{i}.brep") for i in range(len(solids))]
-        for solid, path in zip(solids, paths, strict=True):
-            solid.exportBrep(path)
-        out, script = Path(folder) / "out.json", Path(folder) / "check.py"
+    paths = sorted(str(path) for path in folder.glob("*.brep"))
+    with tempfile.TemporaryDirectory() as other:
+        out, script = Path(other) / "out.json", Path(other) / "check.py"
         script.write_text(f"PATHS = {paths!r}\nOUT = {str(out)!r}\n{FREECAD}")
         subprocess.run([program, str(script)], check=True, capture_output=True)
-        return len(json.loads(out.read_text()))
+        return [Path(path).stem for path in json.loads(out.read_text())]
 
 
 def main() -> None:
-    chosen = list(cases())[:: 8 if "--quick" in sys.argv else 1]
-    outcomes, solids = [], []
-    for case in chosen:
-        outcome, solid = one(*case)
-        outcomes.append(outcome)
-        if solid is not None:
-            solids.append(solid)
-        print(outcome, file=sys.stderr, flush=True)
-    if "--table" in sys.argv:
-        with Path(sys.argv[sys.argv.index("--table") + 1]).open("w", newline="", encoding="utf-8") as file:
-            rows = csv.writer(file)
-            rows.writerow(vars(outcomes[0]))
-            rows.writerows(vars(outcome).values() for outcome in outcomes)
-    show(outcomes, solids)
+    options = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    options.add_argument("--quick", action="store_true", help="every eighth paste")
+    options.add_argument("--table", type=Path, help="where to write the table, as CSV")
+    options.add_argument("--jobs", type=int, default=1, help="how many processes share the pastes")
+    options.add_argument("--folder", type=Path, help="keeps outcomes and solids; what is there is not redone")
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = given.folder or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        run = partial(kept_outcome, folder=folder)
+        chosen = cases()[:: 8 if given.quick else 1]
+        with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
+            outcomes = list(pool.map(run, chosen))
+        if given.table:
+            with given.table.open("w", newline="", encoding="utf-8") as file:
+                rows = csv.writer(file)
+                rows.writerow(asdict(outcomes[0]))
+                rows.writerows(astuple(outcome) for outcome in outcomes)
+        show(outcomes, refused_by_freecad(folder))
 
 
-def show(outcomes: list[Outcome], solids: list[cq.Solid]) -> None:
+def show(outcomes: list[Outcome], refused: list[str] | None) -> None:
     good = [o for o in outcomes if o.end == "solid"]
     # What geometry forbids: feet beyond the flanks, a face too small, a bend too tight.
     forbidden = ("width:", "expected a strip", "path: expected bends", "expected bends")
@@ -206,13 +264,13 @@ def show(outcomes: list[Outcome], solids: list[cq.Solid]) -> None:
     report.add("of those that geometry allows: solids [%]", at_least(99), 100 * len(good) / len(possible))
     report.add("volume added / integral - 1, the largest", at_most(1e-3), max(o.volume_error for o in good))
     report.tell("median seconds, with all checks", f"{np.median([o.seconds for o in good]):.2f}")
+    report.tell("most seconds, with all checks", f"{max(o.seconds for o in outcomes):.1f}")
     for method, count in Counter(o.method for o in good).most_common():
         report.tell(f"method {method}", str(count))
     for end, count in Counter(o.end for o in outcomes if o.end != "solid").most_common(12):
         report.tell(end, str(count))
-    refused = refused_by_freecad(solids)
     if refused is not None:
-        report.add("solids that FreeCAD finds faulty", at_most(0), refused)
+        report.add("solids that FreeCAD finds faulty", at_most(0), len(refused), ", ".join(refused))
     report.show()
 
 
