@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.GeomAbs import GeomAbs_BSplineCurve, GeomAbs_Line
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Vertex, TopoDS_Wire
@@ -50,7 +50,8 @@ def half_edges(wire: TopoDS_Wire, face: TopoDS_Face) -> list[HalfEdge]:
 
 def half_edge(edge: TopoDS_Edge, face: TopoDS_Face, span: tuple[float, float] | None = None) -> HalfEdge:
     """An oriented edge of a face, or the stretch `span` of it; of a seam the side that it is oriented to."""
-    curve = BRepAdaptor_Curve2d(edge, face)
+    # a face turned against its surface would give a seam's other side
+    curve = BRepAdaptor_Curve2d(edge, TopoDS.Face_s(face.Oriented(TopAbs_FORWARD)))
     kind = curve.GetType()
     straight = kind == GeomAbs_Line
     count = 1 if straight else 8 + 4 * curve.NbKnots() if kind == GeomAbs_BSplineCurve else 64
