@@ -10,17 +10,19 @@ from typing import Any
 import cadquery as cq
 import numpy as np
 from OCP.gp import gp_Trsf
+from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
 from cad_export.carried import carried_by, faces_of
-from cad_export.check import volume
+from cad_export.check import subshapes, volume
 from cad_export.geometry import topods
 from cad_export.loading import carried_in
 from cad_export.paste_history import from_text
 from cad_export.pasting import paste
 from cad_export.record import Carried
 from cad_export.step_file import read_step
+from cad_export.step_model import named
 from ridgefeature.io.feature import from_document
 
 _SAME_VOLUME = 1e-5
@@ -34,21 +36,25 @@ def regenerate(
     part: the path of a STEP file that `step` wrote, or the solid itself; a Workplane serves too. What is left
     out of h and w stays as it was. name: of the only ridge to change, as the STEP file names it; without it
     all of them change. The host of the first paste and every placement are stored with the part. Raises
-    ValueError for a part without a pasted ridge, an unknown name, and a part that was changed after its last
-    paste: what was done to it since is not known, so run the script that made it instead.
+    ValueError for a part without a pasted ridge, several solids, an unknown name, and a part that was changed
+    after its last paste: what was done to it since is not known, so run the script that made it instead. Of
+    what was pasted before such a change, and pasted on later, the same holds.
     """
     shape, records = _read(part)
     pasted = [_Paste(r, r.placement, r.host["brep"]) for r in records if r.placement and r.host]
     if not pasted:
-        raise ValueError("part: expected one with a pasted ridge, got none; paste a ridge first")
-    pasted.sort(key=lambda paste: int(paste.place["order"]))
-    chain = [p for p in pasted if p.host == pasted[-1].host]
-    if [p.place["order"] for p in chain] != list(range(len(chain))):
-        raise ValueError("part: some of its pasted ridges are missing; run the script that made it instead")
-    _check_unchanged(shape, chain[-1].place)
-    names = [p.record.name for p in chain]
-    if name is not None and name not in names:
-        raise ValueError(f"name: expected one of {', '.join(names)}, got {name!r}")
+        raise ValueError(
+            "part: expected one with a pasted ridge, got none; paste a ridge first, or give a ridge alone "
+            "other rates by resized"
+        )
+    solids = subshapes(shape, TopAbs_SOLID)
+    if len(solids) != 1:
+        raise ValueError(
+            f"part: expected one solid, got {len(solids)}; give one of them, which are in "
+            "cq.Shape.cast(shape).Solids()"
+        )
+    chain = _chain(shape, pasted)
+    _check_name(name, [p.record.name for p in chain], [p.record.name for p in pasted])
     solid: Any = from_text(chain[0].host)
     for step in chain:
         chosen = name is None or step.record.name == name
@@ -73,17 +79,50 @@ def _read(part: Any) -> tuple[TopoDS_Shape, list[Carried]]:
     if len(values) != 1:
         raise ValueError(f"part: expected one shape, got {len(values)}; choose one")
     shape = topods(values[0])
-    return shape, [record for _, record in carried_by(shape)]
+    # named as in a STEP file; the faces of a ridge that was cut in two are one
+    return shape, list({record.name: record for _, record in named(carried_by(shape))}.values())
 
 
-def _check_unchanged(shape: TopoDS_Shape, place: dict[str, Any]) -> None:
-    found, made = volume(shape, 1e-6), place["part_volume"]
-    if len(faces_of(shape)) != place["part_faces"] or abs(found - made) > _SAME_VOLUME * abs(made):
+def _chain(shape: TopoDS_Shape, pasted: list[_Paste]) -> list[_Paste]:
+    """The pastes on one host, in order, that made the shape as it is.
+
+    A part that was changed and then pasted on again is the host of another chain.
+    """
+    found, made = volume(shape, 1e-6), []
+    for host in dict.fromkeys(p.host for p in pasted):
+        chain = sorted((p for p in pasted if p.host == host), key=lambda p: int(p.place["order"]))
+        place = chain[-1].place
+        if len(faces_of(shape)) != place["part_faces"] or (
+            abs(found - place["part_volume"]) > _SAME_VOLUME * abs(found)
+        ):
+            made.append(f"{place['part_faces']} faces and the volume {place['part_volume']:.9g}")
+        elif [p.place["order"] for p in chain] == list(range(len(chain))):
+            return chain
+    if not made:
+        raise ValueError("part: some of its pasted ridges are missing; run the script that made it instead")
+    raise ValueError(
+        f"part: expected {' or '.join(made)} that its last paste left, got {len(faces_of(shape))} and "
+        f"{found:.9g}: it was changed since; run the script that made it instead"
+    )
+
+
+def _check_name(name: str | None, known: list[str], all_names: list[str]) -> None:
+    """Whether the ridges that are meant can change: all of them without a name."""
+    told = ", ".join(map(repr, known))
+    fixed = [other for other in all_names if other not in known]
+    if name is None and fixed:
         raise ValueError(
-            f"part: expected {place['part_faces']} faces and the volume {made:.9g} that its last paste left, "
-            f"got {len(faces_of(shape))} and {found:.9g}: it was changed since; run the script that made it "
-            "instead"
+            f"name: expected one of {told}, got none: the part was changed after the paste of "
+            f"{', '.join(map(repr, fixed))}, which cannot change any more; name one, or run the script that "
+            "made it instead"
         )
+    if name in fixed:
+        raise ValueError(
+            f"name: expected one of {told}, got {name!r}, after whose paste the part was changed; run the "
+            "script that made it instead"
+        )
+    if name is not None and name not in known:
+        raise ValueError(f"name: expected one of {told}, got {name!r}")
 
 
 def _again(solid: Any, step: _Paste, h: float | None, w: float | None, check: bool) -> cq.Solid:

@@ -13,6 +13,7 @@ from typing import Any
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.gp import gp_Trsf
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader
@@ -24,12 +25,13 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 from cad_export.carried import attach, faces_of
 from cad_export.geometry import RidgeLike, make_face, surface_for, topods
 from cad_export.occt_session import quiet
-from cad_export.record import Carried, record_of
+from cad_export.record import UNMOVED, Carried, record_of
 from cad_export.step_document import assembly_document, document, features_of, is_assembly
 from cad_export.step_model import add_properties, name_faces, name_products, named
 from cad_export.step_properties import items, records_in
 from cad_export.step_text import directives
 from ridgefeature.bspline import Surface
+from ridgefeature.ridge import Ridge
 
 SCHEMAS = {
     "AP203": "AP203",
@@ -134,6 +136,15 @@ def shape_in_mm(source: Any, h: float = 1, w: float = 1) -> TopoDS_Shape:
             "expected a Workplane with a shape on its stack, got an empty one; make a shape first"
         )
     return shapes[0] if len(shapes) == 1 else _compound(shapes)
+
+
+def moved_face(ridge: Ridge, record: Carried, h: float, w: float) -> TopoDS_Shape:
+    """The ridge's face in millimetres at rates h and w, where the record's motion puts it."""
+    face, move = shape_in_mm(ridge, h, w), gp_Trsf()
+    if record.motion == UNMOVED:
+        return face
+    move.SetValues(*(x for row in record.motion for x in row))
+    return face.Moved(TopLoc_Location(move))
 
 
 def _compound(shapes: list[TopoDS_Shape]) -> TopoDS_Shape:

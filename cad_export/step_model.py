@@ -101,8 +101,8 @@ def name_products(model: Any, name: str | None) -> None:
     products = [entity for entity in entities if isinstance(entity, StepBasic_Product)]
     names: list[str] = []
     for n, product in enumerate(products, 1):
-        own = name if len(products) == 1 else f"{name} {n}"
-        kept = own if name is not None else product.Name().ToCString()
+        own = product.Name().ToCString() if name is None else name
+        kept = own if name is None or len(products) == 1 else f"{name} {n}"
         product.SetName(TCollection_HAsciiString(kept))
         names.append(unused(kept, names))
         product.SetId(TCollection_HAsciiString(names[-1]))  # one of its own, by ISO 10303-41

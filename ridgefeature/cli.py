@@ -100,26 +100,18 @@ def register(**options: Any) -> int:
     metavar="X.step",
     help="File to write: .step .stp .iges .igs .brep .stl .3mf .glb .gltf .FCMacro",
 )
-@click.option(
-    "--h",
-    "h",
-    type=float,
-    default=1.0,
-    show_default=True,
-    metavar="RATE",
-    help="Multiply the height by this.",
-)
-@click.option(
-    "--w", "w", type=float, default=1.0, show_default=True, metavar="RATE", help="Multiply the width by this."
-)
-def export(feature: Path, output: Path, h: float, w: float) -> None:
-    """Write the surface of FEATURE as CAD, in millimetres, taller or slimmer if asked.
+@click.option("--h", "h", type=float, metavar="RATE", help="Height: 1 is as registered.")
+@click.option("--w", "w", type=float, metavar="RATE", help="Width: 1 is as registered.")
+@click.option("--name", metavar="NAME", help="The ridge that is meant, of several in a STEP file.")
+def export(feature: Path, output: Path, h: float | None, w: float | None, name: str | None) -> None:
+    """Write FEATURE as CAD, in millimetres, taller or slimmer if asked.
 
-    FEATURE is a .ridge.json, or a STEP file that carries a feature.
+    FEATURE is a .ridge.json, or a STEP file that carries ridges. Rates that are not given stay as they are in
+    the STEP file; a part with pasted ridges is regenerated at new ones.
     """
     from ridgefeature.commands.export import run
 
-    run(feature, output, h, w)
+    run(feature, output, h, w, name)
 
 
 @main.command()

@@ -113,9 +113,9 @@ class Ridge(Stations):
         h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a
         function of arc length (k,) -> (k,). between: arc lengths (s0, s1) of the stretch that changes,
         blended smoothly inside it over a third of the stretch or one width, whichever is less. Standard
-        deviations follow. Raises ValueError for both a rate and an absolute value, values that are not
-        finite, w or width not above 0, a width too large for the flanks, or a stretch that is not on the
-        ridge.
+        deviations follow; that of a height made 0 is 0. Raises ValueError for both a rate and an absolute
+        value, values that are not finite, w or width not above 0, a width too large for the flanks, or a
+        stretch that is not on the ridge.
         """
         blend = self._blend(between)
         new_height, height_rate = self._changed("height", "h", self.height, h, height, blend)
@@ -135,8 +135,8 @@ class Ridge(Stations):
             self,
             height=new_height,
             width=new_width,
-            height_std=self.height_std * np.abs(height_rate),
-            width_std=self.width_std * width_rate,
+            height_std=_times(self.height_std, np.abs(height_rate)),
+            width_std=_times(self.width_std, width_rate),
         )
 
     def _changed(
@@ -252,6 +252,11 @@ class Ridge(Stations):
             "M_floor": float(np.mean([t.M_floor for t in self.templates])),
             "settings": asdict(self.settings),
         }
+
+
+def _times(std: Array, rate: Array) -> Array:
+    """Standard deviations at local rates: of a value that was made 0 it is 0, also where it was infinite."""
+    return np.multiply(std, rate, out=np.zeros_like(rate), where=rate != 0)
 
 
 def _finite(value: Any, name: str, shape: tuple[int, ...] | None = None) -> Array:

@@ -167,7 +167,7 @@ def test_export_from_a_step_file_and_info(ridge: rf.Ridge, tmp_path: Path) -> No
     assert done.exit_code == 0, done.stderr
     assert run("export", tmp_path / "a.step", "-o", tmp_path / "b.iges", "--w", 0.9).exit_code == 0
     top = bounds(tmp_path / "b.iges")[1, 2]
-    assert top == pytest.approx(box(cx.face(ridge, w=0.9))[1, 2], abs=0.01)  # as registered, not 1.5
+    assert top == pytest.approx(box(cx.face(ridge, h=1.5, w=0.9))[1, 2], abs=0.01)  # as recorded, not 1
     info = json.loads(run("info", tmp_path / "a.step", "--json").stdout)
     assert info["features"] == [
         {
@@ -177,6 +177,7 @@ def test_export_from_a_step_file_and_info(ridge: rf.Ridge, tmp_path: Path) -> No
             "templates": len(ridge.templates),
             "h": 1.5,
             "w": 1.0,
+            "pasted": False,
         }
     ]
     assert "carries ridge" in run("info", tmp_path / "a.step").stdout
@@ -189,7 +190,8 @@ def test_export_from_a_step_file_and_info(ridge: rf.Ridge, tmp_path: Path) -> No
 def test_a_step_file_with_two_ridges_or_cut_off_is_told(ridge: rf.Ridge, tmp_path: Path) -> None:
     two = cq.Compound.makeCompound([cx.face(ridge), cx.face(ridge, h=2)])
     path = cx.step(two, tmp_path / "two.step")
-    fails(run("export", path, "-o", tmp_path / "x.stl"), 2, "two.step", "got 2 ('ridge', 'ridge 2')")
+    words = "export", path, "-o", tmp_path / "x.stl", "--h", 2
+    fails(run(*words), 2, "two.step", "got 2 ('ridge', 'ridge 2')", "--name")
     (tmp_path / "cut.step").write_bytes(path.read_bytes()[:9000])
     fails(run("export", tmp_path / "cut.step", "-o", tmp_path / "x.stl"), 2, "cut.step", "cut off")
     fails(run("info", tmp_path / "cut.step"), 2, "cut.step", "cut off")

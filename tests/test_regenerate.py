@@ -73,6 +73,42 @@ def test_a_part_that_was_changed_since_is_refused(part):
         cx.regenerate(cq.Workplane(part).faces("<Z").workplane().hole(3))
 
 
+def test_a_named_ridge_of_the_solid_is_that_of_its_file(part, tmp_path):
+    names = [record.name for record in cx.carried_in(cx.step(part, tmp_path / "part.step"))]
+    assert names == ["ridge", "ridge 2"]  # both were pasted as "ridge"
+    changed = cx.carried_by(cx.regenerate(part, h=3, name="ridge 2", check=False))
+    assert {record.name: record.h for _, record in changed} == {"ridge": 1.2, "ridge 2": 3}
+
+
+def test_a_part_that_was_moved_or_drilled_and_pasted_on_again(part, ridge):
+    place = cq.Location(cq.Vector(5, 6, 7), cq.Vector(0, 0, 1), 30)
+    top = (place * cq.Location((45, 0, 5))).toTuple()[0]
+    hole = cq.Solid.makeCylinder(1, 40, cq.Vector(52, -30, -20)).moved(place)
+    for host in (part.moved(place), part.moved(place).cut(hole)):
+        along = (-0.5, 3**0.5 / 2, 0)
+        again = cx.paste(ridge, host, at=top, direction=along, scale=0.4, name="late", check=False)
+        with pytest.raises(ValueError, match=r"one of 'late', got none: .* 'ridge', 'ridge 2', which cannot"):
+            cx.regenerate(again, h=2)
+        with pytest.raises(ValueError, match="got 'ridge', after whose paste the part was changed"):
+            cx.regenerate(again, h=2, name="ridge")
+        higher = cx.regenerate(again, h=2, name="late", check=False)
+        # added volume is linear in h on a plane; volumes are integrated to 1e-6 of the whole part
+        twice, room = 2 * volume_added(again, host), 4e-6 * host.Volume()
+        assert room < 0.01 * twice
+        assert volume_added(higher, host) == pytest.approx(twice, abs=room)
+        assert {r.name: r.h for _, r in cx.carried_by(higher)} == {"ridge": 1.2, "ridge 2": 1, "late": 2}
+
+
+def test_several_solids_are_refused_and_each_regenerates(part, tmp_path):
+    two = cq.Assembly(part, name="a").add(part, name="b", loc=cq.Location((0, 100, 0)))
+    file = cx.step(two, tmp_path / "two.step")
+    with pytest.raises(ValueError, match="expected one solid, got 2; give one of them"):
+        cx.regenerate(file, h=2)
+    for solid in cq.Shape.cast(cx.read_step(file)).Solids():
+        again = cx.regenerate(solid, check=False)
+        assert (again.Center() - solid.Center()).Length < 1e-6
+
+
 def test_what_cannot_be_regenerated_says_why(part, host, ridge, tmp_path):
     with pytest.raises(ValueError, match="pasted ridge"):
         cx.regenerate(host)

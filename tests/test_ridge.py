@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
@@ -238,6 +239,21 @@ def test_distance_takes_a_few_points(ridge):
 
 
 # Nothing changes in place
+
+
+@pytest.mark.parametrize("change", [{"h": 0}, {"height": 0.0}])
+def test_a_height_made_zero_is_exact_also_where_its_deviation_was_infinite(ridge, change):
+    std = ridge.height_std.copy()
+    std[3] = np.inf
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        flat = replace(ridge, height_std=std).resized(**change)
+        part = replace(ridge, height_std=std).resized(**change, between=(0.0, ridge.length / 2))
+        twice = replace(ridge, height_std=std).resized(h=2)
+    assert not flat.height.any() and not flat.height_std.any()
+    assert not part.height_std[:4].any()
+    np.testing.assert_array_equal(part.height_std[-4:], std[-4:])
+    np.testing.assert_array_equal(twice.height_std, 2 * std)
 
 
 def test_a_ridge_is_frozen_and_resizing_leaves_it_as_it_was(ridge):

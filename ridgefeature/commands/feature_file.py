@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ridgefeature.io import load
 from ridgefeature.ridge import Ridge
 
+if TYPE_CHECKING:
+    from cad_export.record import Carried
+
 CAD = (".step", ".stp")
+
+
+def check_is_file(path: Path) -> None:
+    """Raises OSError for a path that is not one of a file."""
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: expected a feature file, this is a folder: name a file in it")
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such file: check the path")
 
 
 def load_feature(path: Path) -> Ridge:
@@ -15,20 +27,25 @@ def load_feature(path: Path) -> Ridge:
 
     Raises OSError or ValueError.
     """
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: expected a feature file, this is a folder: name a file in it")
-    if not path.exists():
-        raise FileNotFoundError(f"{path}: there is no such file: check the path")
+    check_is_file(path)
     if path.suffix.lower() not in CAD:
         return load(path)
     from cad_export.loading import carried_in, ridge_of
 
-    records = carried_in(path)
-    if len(records) > 1:
-        names = ", ".join(repr(record.name) for record in records)
-        raise ValueError(
-            f"{path}: expected one ridge feature, got {len(records)} ({names}); in Python, "
-            "cad_export.load(path, name=...).save(...) makes a .ridge.json of one"
-        )
-    ridge: Ridge = ridge_of(records[0], path)
+    ridge: Ridge = ridge_of(chosen(path, carried_in(path), None), path)
     return ridge
+
+
+def chosen(path: Path, records: list[Carried], name: str | None) -> Carried:
+    """The record of that name; without one, the only record. Raises ValueError where there is none such."""
+    names = ", ".join(repr(record.name) for record in records)
+    if name is None:
+        if len(records) != 1:
+            raise ValueError(
+                f"{path.name}: expected one ridge feature, got {len(records)} ({names}); choose one by --name"
+            )
+        return records[0]
+    for record in records:
+        if record.name == name:
+            return record
+    raise ValueError(f"--name: expected one of {names} in {path.name}, got {name!r}; choose one")

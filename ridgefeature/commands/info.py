@@ -107,7 +107,7 @@ def _step(file: Path) -> Found:
         (
             f"carries {one['name']}",
             f"{number(one['length'])} {one['unit']} long, {one['templates']} templates, "
-            f"h {number(one['h'])}, w {number(one['w'])}",
+            f"h {number(one['h'])}, w {number(one['w'])}{', pasted' if one['pasted'] else ''}",
         )
         for one in carried
     ] or [("carries", "no ridge feature")]
@@ -124,4 +124,5 @@ def _carried(record: Any) -> dict[str, Any]:
         "templates": len(record.feature["templates"]),
         "h": record.h,
         "w": record.w,
+        "pasted": record.placement is not None,
     }
