@@ -61,11 +61,35 @@ class Samples:
     closed: bool
 
 
-def samples_of(base: _Strip) -> Samples:
-    """Samples of a base, fine enough that between them the strip is nearly flat."""
+def places_along(base: _Strip) -> Floats:
+    """Arc lengths (n,) at which a base is looked at: between them the strip is nearly flat."""
     rough = base.breadth(np.linspace(0, base.length, 65)).min()
     n = int(np.clip(np.ceil(base.length / (_STEP * rough)), 16, _MOST)) + 1
-    s = np.linspace(0.0, base.length, n)
+    return np.linspace(0.0, base.length, n)
+
+
+def check_seams(x: Floats, points: Floats, host: Host) -> None:
+    """Raise ValueError where points at x (..., 2) are over a seam at which a surface closes without a period.
+
+    Such surfaces, as those of a loft, are not evaluated beyond it: the strip would be squeezed flat there.
+    """
+    surface = BRep_Tool.Surface_s(host.face)
+    u0, u1, v0, v1 = surface.Bounds()
+    closed = (surface.IsUClosed(), surface.IsVClosed())
+    for i, (low, high) in enumerate(((u0, u1), (v0, v1))):
+        slack = 1e-9 * (high - low)
+        beyond = (x[..., i] < low - slack) | (x[..., i] > high + slack)
+        if closed[i] and not host.periods[i] and beyond.any():
+            where = np.round(points[beyond][0], 4).tolist()
+            raise ValueError(
+                f"path: expected a strip clear of the seam at which the face closes, it runs over it near "
+                f"{where}; move the path off the seam, or turn the host's sketch to move the seam"
+            )
+
+
+def samples_of(base: _Strip) -> Samples:
+    """Samples of a base, at places_along it."""
+    s = places_along(base)
     breadth = base.breadth(s)
     y = breadth[:, None] * np.linspace(-1, 1, _ACROSS)
     x = base.parameters(s, y)
@@ -74,6 +98,7 @@ def samples_of(base: _Strip) -> Samples:
         raise ValueError(
             "expected a strip that the face's surface has normals for; move it away from the surface's poles"
         )
+    check_seams(x, points, base.host)
     across = np.gradient(points, axis=1)
     across -= normal * (across * normal).sum(axis=-1, keepdims=True)
     left = across / np.linalg.norm(across, axis=-1, keepdims=True)

@@ -388,6 +388,16 @@ def line(*points: tuple[float, float, float]) -> cq.Wire:
     return cq.Wire.makePolygon([cq.Vector(*p) for p in points])
 
 
+def lofted() -> cq.Face:
+    """A face that closes on itself along u, but whose B-spline surface is not periodic."""
+    body = cq.Workplane().ellipse(20, 15).workplane(offset=60).ellipse(26, 18).loft()
+    return body.faces("not %PLANE").val()
+
+
+def seam_of(face: cq.Face) -> cq.Edge:
+    return next(edge for edge in face.Edges() if BRep_Tool.IsClosed_s(edge.wrapped, face.wrapped))
+
+
 REFUSED = {
     "longer than the face": (lambda: face_base(top(), made_ridge(140.0)), "leaves the face"),
     "over the border": (lambda: face_base(top(), STRAIGHT, at=(0, 26, 5)), "leaves the face"),
@@ -414,6 +424,14 @@ REFUSED = {
     "around a thin tube": (
         lambda: face_base(tube(8), STRAIGHT, at=(8, 0, 60), direction=(0, 1, 0.01)),
         "overlaps",
+    ),
+    "along the seam of a loft": (
+        lambda: face_base(lofted(), STRAIGHT, path=seam_of(lofted())),
+        "clear of the seam at which the face closes",
+    ),
+    "across the seam of a loft": (
+        lambda: face_base(lofted(), SMALL, at=seam_of(lofted()).positionAt(0.5), direction=(0, 1, 0)),
+        "clear of the seam at which the face closes",
     ),
     "at off the face": (lambda: face_base(top(), STRAIGHT, at=(0, 0, 9)), "at: expected a point within"),
     "at NaN": (lambda: face_base(top(), STRAIGHT, at=(0, np.nan, 5)), "at: expected three finite"),
