@@ -6,19 +6,21 @@ OCP only, no cadquery.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Check
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.GeomAbs import GeomAbs_Line
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
@@ -28,13 +30,36 @@ from cad_export import occt_arrays
 from cad_export.check import is_seam, subshapes
 from ridgefeature.bspline import Surface
 
+ROUGH = 0.0
+"""Gauss points by the number of poles, without a look at what they leave out."""
+_GROUND = 1e-5
+"""Accuracy at which the ground is measured for rough ones: it is large, and measured once."""
 VOLUME = 1e-3
 """Largest relative error of the volume added."""
 TOLERANCE = 5e-4
 """Largest tolerance of an edge, as a part of the ridge's breadth."""
-INTEGRATION = (1e-3, 1e-5, 1e-7)
+INTEGRATION = (ROUGH, 1e-3, 1e-5, 1e-7)
 """Relative accuracies asked of OCCT's integration, whose default fails on faces with long holes; the finer
 ones, which take longer, only where the coarser do not bear out the expected volume."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What remains of a face: its part in the volume as measured, by the accuracy; for all heights the same.
+
+    near: the point from which cones to faces start.
+    """
+
+    near: gp_Pnt
+    measured: dict[float, float] = field(default_factory=dict)
+
+
+def ground_under(base: Surface) -> Ground:
+    """Nothing measured yet, from a point near by, off the base: a face that it lies on would not count."""
+    (u0, u1), (v0, v1) = base.domain
+    u, v = 0.5 * (u0 + u1), 0.5 * (v0 + v1)
+    breadth = np.linalg.norm(base.poles[:, 0] - base.poles[:, -1], axis=1).max()
+    return Ground(gp_Pnt(*(base(u, v) - 0.25 * breadth * base.normal(u, v)).tolist()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +67,8 @@ class Change:
     """A solid made from a host by new faces in place of old ones.
 
     base: the surface for height 0. volume_expected: what the change should add, below 0 for a groove.
+    remaining: new faces that are what is left of the old; ground: their part in the volume, kept.
+    rough: whether the fastest integration may do.
     """
 
     old: tuple[TopoDS_Face, ...]
@@ -49,23 +76,23 @@ class Change:
     new: tuple[TopoDS_Face, ...]
     base: Surface
     volume_expected: float
+    remaining: tuple[TopoDS_Face, ...] = ()
+    ground: Ground | None = None
+    rough: bool = False
 
     @cached_property
     def volume_added(self) -> float:
         """Volume between the new faces and the old ones, as OCCT integrates it.
 
         The host's other faces are the same before and after, so their part cancels and is left out.
-        The cones to the faces start from a point near by, off the base: a face that runs through the point
-        would not count.
         """
-        (u0, u1), (v0, v1) = self.base.domain
-        u, v = 0.5 * (u0 + u1), 0.5 * (v0 + v1)
-        near = gp_Pnt(*(self.base(u, v) - 0.25 * self.breadth * self.base.normal(u, v)).tolist())
-        got = 0.0
-        for accuracy in INTEGRATION:
-            got = sum(_cone(f, near, accuracy) for f in self.new) - sum(
-                _cone(f, near, accuracy) for f in self.old
-            )
+        got, ground = 0.0, self.ground or ground_under(self.base)
+        for accuracy in INTEGRATION[0 if self.rough else 1 :]:
+            if accuracy not in ground.measured:
+                fine = accuracy or _GROUND
+                before = sum(_cone(f, ground.near, fine) for f in self.old)
+                ground.measured[accuracy] = sum(_cone(f, ground.near, fine) for f in self.remaining) - before
+            got = ground.measured[accuracy] + sum(_cone(f, ground.near, accuracy) for f in self.new)
             if abs(got - self.volume_expected) <= 0.5 * self.volume_error:
                 break
         return got
@@ -85,14 +112,38 @@ class Change:
     @cached_property
     def largest_tolerance(self) -> float:
         """Largest tolerance of the edges of new faces."""
-        edges = (e for f in self.new for e in subshapes(f, TopAbs_EDGE))
+        edges = (e for f in (*self.new, *self.remaining) for e in subshapes(f, TopAbs_EDGE))
         return max(BRep_Tool.Tolerance_s(TopoDS.Edge_s(e)) for e in edges)
 
 
 def _cone(face: TopoDS_Face, point: gp_Pnt, accuracy: float) -> float:
     """Signed volume between a face and a point."""
-    parts = BRepGProp_Face(face), BRepGProp_Domain(face)
-    return float(BRepGProp_Vinert(*parts, point, point, accuracy).Mass())
+    smooth, edges = BRepGProp_Face(face), BRepGProp_Domain(face)
+    if accuracy != ROUGH:
+        return float(BRepGProp_Vinert(smooth, edges, point, point, accuracy).Mass())
+    if is_whole(face):
+        return float(BRepGProp_Vinert(smooth, point).Mass())
+    return float(BRepGProp_Vinert(smooth, edges, point).Mass())
+
+
+def is_whole(face: TopoDS_Face) -> bool:
+    """Whether a face's edges lie on the bounds of its surface, all round."""
+    u0, u1, v0, v1 = BRep_Tool.Surface_s(face).Bounds()
+    lengths = {u0: 0.0, u1: 0.0}, {v0: 0.0, v1: 0.0}
+    for edge in subshapes(face, TopAbs_EDGE):
+        line = BRepAdaptor_Curve2d(TopoDS.Edge_s(edge), face)
+        if line.GetType() != GeomAbs_Line:
+            return False
+        a, b = (line.Value(t) for t in (line.FirstParameter(), line.LastParameter()))
+        if a.X() == b.X() and a.X() in lengths[0]:
+            lengths[0][a.X()] += abs(b.Y() - a.Y())
+        elif a.Y() == b.Y() and a.Y() in lengths[1]:
+            lengths[1][a.Y()] += abs(b.X() - a.X())
+        else:
+            return False
+    sides = [(length, v1 - v0) for length in lengths[0].values()]
+    sides += [(length, u1 - u0) for length in lengths[1].values()]
+    return all(abs(length - whole) <= 1e-9 * whole for length, whole in sides)
 
 
 def certify(change: Change, thorough: bool = True) -> None:

@@ -17,14 +17,30 @@ Floats = NDArray[np.float64]
 class Lift:
     """A stretch of an end row that is off the base, and the ruled surface between the two.
 
-    span: parameters across. The surface's u is the row's parameter, its v the distance along `up`; the base's
-    row is at v = 0 and the ridge's at v = rise(u), to within `distance`.
+    span: parameters across. foot: the base's row, up: unit vectors from it, reach: how far the surface goes
+    along them, one of both bounds 0; poles of cubics on `knots`. rise: how far the ridge's row is from the
+    base's, to within `distance`.
     """
 
     span: tuple[float, float]
-    surface: Surface
+    knots: Floats
+    foot: Floats
+    up: Floats
+    reach: Floats
     rise: Curve
     distance: float
+
+    @property
+    def surface(self) -> Surface:
+        """u is the row's parameter, v the distance along `up`; the ridge's row is at v = rise(u)."""
+        low, high = self.reach
+        poles = self.foot[:, None] + self.reach[:, None] * self.up[:, None]
+        return Surface(poles, self.knots, np.array([low, low, high, high]), 3, 1)
+
+    def times(self, factor: float) -> Lift:
+        """The same stretch with the row `factor` times as far off the base, factor above 0."""
+        rise = replace(self.rise, poles=factor * self.rise.poles)
+        return replace(self, reach=factor * self.reach, rise=rise, distance=factor * self.distance)
 
 
 def lifts(row: Curve, base: Curve, least: float) -> list[Lift]:
@@ -83,64 +99,15 @@ def _lift(row: Curve, base: Curve, a: float, b: float) -> Lift:
     up = np.linalg.lstsq(basis * size, gap, rcond=1e-9)[0]
     foot = interpolate(knots, 3, base(greville(knots, 3)))
     reach = np.array([min(0.0, 1.25 * size.min()), max(0.0, 1.25 * size.max())])
-    poles = foot[:, None] + reach[:, None] * up[:, None]
-    surface = Surface(poles, knots, np.array([reach[0], reach[0], reach[1], reach[1]]), 3, 1)
     sites = greville(fine, 3)
     at = row(sites) - base(sites)
     along = basis_matrix(knots, 3, sites) @ up
     rise = Curve(interpolate(fine, 3, (at * along).sum(1) / (along**2).sum(1))[:, None], fine, 3)
     off = np.linalg.norm((basis @ up) * rise(t) - gap, axis=1).max()
     off = max(float(off), float(np.linalg.norm(base(t) - basis @ foot, axis=1).max()))
-    return Lift((a, b), surface, rise, off)
+    return Lift((a, b), knots, foot, up, reach, rise, off)
 
 
 def _halved(breaks: Floats, parts: int) -> Floats:
     at = np.arange(parts * (len(breaks) - 1) + 1) / parts
     return np.interp(at, np.arange(len(breaks)), breaks)
-
-
-def _caps_flux(surface: Surface, base: Surface) -> float:
-    """The caps' part in the volume: ruled faces from the base's end rows to the ridge's."""
-    if surface.closed[0]:
-        return 0.0
-    up = np.array([0.0, 0.0, 1.0, 1.0])
-    ends = (
-        Surface(np.stack([base.poles[k], surface.poles[k]], axis=1), base.knots_v, up, base.degree_v, 1)
-        for k in (0, -1)
-    )
-    first, last = (end.flux() for end in ends)
-    return last - first
-
-
-def volume_between(surface: Surface, base: Surface) -> float:
-    """Volume from the base up to the surface, caps included, below 0 for a groove: exact by Gauss-Legendre.
-
-    As the difference of both surfaces' flux, worked out on one set of nodes (divergence theorem). Raises
-    ValueError where the surface turns over above its base: where their normals point to opposite sides.
-    """
-    (u, wu), (v, wv) = (
-        _gauss(k, d) for k, d in ((base.knots_u, base.degree_u), (base.knots_v, base.degree_v))
-    )
-    along = [basis_matrix(base.knots_u, base.degree_u, u, k) for k in (0, 1)]
-    across = [basis_matrix(base.knots_v, base.degree_v, v, k) for k in (0, 1)]
-    centre = base.poles.mean(axis=(0, 1))  # near by, so that digits are not lost in the difference
-    poles = np.stack([surface.poles, base.poles]) - centre
-    rows = [np.matmul(a, poles.reshape(2, len(poles[0]), -1)).reshape(2, len(u), -1, 3) for a in along]
-    point, du, dv = (np.matmul(across[k], rows[i]) for i, k in ((0, 0), (1, 0), (0, 1)))
-    normal = np.cross(du, dv)
-    if not ((normal[0] * normal[1]).sum(axis=-1) > 0).all():
-        raise ValueError(
-            "surface: expected one that does not fold over itself, it does; use a lower height or "
-            "a path with wider bends"
-        )
-    flux = np.einsum("smk,m,k->s", (point * normal).sum(axis=-1), wu, wv) / 3
-    moved = replace(surface, poles=poles[0]), replace(base, poles=poles[1])
-    return float(flux[0] - flux[1]) + _caps_flux(*moved)
-
-
-def _gauss(knots: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Nodes and weights, exact for the products of three splines of the degree."""
-    x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
-    breaks = np.unique(knots)
-    half = 0.5 * np.diff(breaks)[:, None]
-    return (breaks[:-1, None] + half * (1.0 + x)).ravel(), (half * w).ravel()

@@ -12,7 +12,7 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from cad_export import occt_arrays
+from cad_export.surface_form import to_occt
 from ridgefeature.bspline import Surface
 
 DEGENERATE = 1e-7  # OCCT's Precision::Confusion, in the surface's unit: shorter borders count as a point
@@ -42,21 +42,6 @@ def surface_for(source: RidgeLike | Surface, h: float = 1, w: float = 1) -> Surf
         return (source if h == 1 and w == 1 else source.resized(h=h, w=w)).surface()
     raise ValueError(
         f"expected a Ridge or a Surface, got {type(source).__name__}; register or load one first"
-    )
-
-
-def to_occt(surface: Surface) -> Geom_BSplineSurface:
-    """The same poles and knots as a Geom_BSplineSurface, neither rational nor periodic."""
-    knots_u, counts_u = np.unique(surface.knots_u, return_counts=True)
-    knots_v, counts_v = np.unique(surface.knots_v, return_counts=True)
-    return Geom_BSplineSurface(
-        occt_arrays.points2(surface.poles),
-        occt_arrays.reals(knots_u),
-        occt_arrays.reals(knots_v),
-        occt_arrays.integers(counts_u),
-        occt_arrays.integers(counts_v),
-        int(surface.degree_u),
-        int(surface.degree_v),
     )
 
 

@@ -12,37 +12,27 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.Geom import Geom_BSplineSurface, Geom_Surface
+from OCP.Geom import Geom_BSplineSurface
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
-from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
     TopoDS,
     TopoDS_Face,
     TopoDS_Shape,
     TopoDS_Shell,
     TopoDS_Solid,
-    TopoDS_Wire,
 )
 
 from cad_export.certificate import Change, certify
 from cad_export.check import subshapes
-from cad_export.end_caps import volume_between
 from cad_export.fallbacks import sunk_fuse
-from cad_export.footprint import (
-    cross,
-    inside,
-    meetings,
-    seams_of,
-    signed_area,
-    surface_on,
-)
-from cad_export.inset_edges import Loop, Maker, SeamError
+from cad_export.inset_edges import Maker
+from cad_export.site import SeamError, Site
 from ridgefeature.bspline import Surface
 
-Floats = NDArray[np.float64]
+_SUNK = 1e-3
+"""How far the face of a fused ridge may lie off its surface, in heights."""
 
 
 @dataclass(frozen=True)
@@ -76,22 +66,34 @@ def inset(
     change, for a host that is not one solid, a face that is not the host's, a border that is off the face,
     leaves it or overlaps a hole in it, and a result that fails a check.
     """
+    solid, _, report = inset_at(host, Site(face_of(host, face), surface, base), 1.0, check)
+    return solid, report
+
+
+def inset_at(
+    host: TopoDS_Shape, site: Site, h: float, check: bool = True
+) -> tuple[TopoDS_Solid, TopoDS_Face, InsetReport]:
+    """As `inset`, at height h of a site on a face of this host: the solid, the ridge's face in it, a report.
+
+    All that does not depend on the height is kept by the site: the next height costs less.
+    """
     start = time.perf_counter()
-    placed = _face_of(host, face)
-    _check_pair(surface, base)
-    expected = volume_between(surface, base)
     try:
-        change, method = _build(host, placed, surface, base, expected), "inset"
+        change, method = _changed(host, site, h, not check), "inset"
+        grown = change.new[0]
         certify(change, thorough=check)
     except SeamError:
-        change, method = sunk_fuse(host, surface, base, check), "sunk fuse"
-    return change.solid, InsetReport(
+        surface = site.at(h)
+        change, method = sunk_fuse(host, surface, site.base, check), "sunk fuse"
+        grown = face_with(change.solid, surface, _SUNK * float(np.abs(surface.poles - site.base.poles).max()))
+    report = InsetReport(
         method,
         change.volume_added,
         change.volume_expected,
         change.largest_tolerance,
         time.perf_counter() - start,
     )
+    return change.solid, grown, report
 
 
 def face_with(solid: TopoDS_Shape, surface: Surface, within: float = 0.0) -> TopoDS_Face:
@@ -116,7 +118,7 @@ def face_with(solid: TopoDS_Shape, surface: Surface, within: float = 0.0) -> Top
     raise ValueError("expected a solid with a face on this surface, got none; paste it first")
 
 
-def _face_of(host: TopoDS_Shape, face: TopoDS_Face) -> TopoDS_Face:
+def face_of(host: TopoDS_Shape, face: TopoDS_Face) -> TopoDS_Face:
     """The face as the host holds it, oriented outwards."""
     if not isinstance(host, TopoDS_Shape) or host.IsNull():
         raise ValueError(
@@ -133,98 +135,15 @@ def _face_of(host: TopoDS_Shape, face: TopoDS_Face) -> TopoDS_Face:
     raise ValueError("face: expected a face of the host, got one of another shape; select it on this host")
 
 
-def _check_pair(surface: Surface, base: Surface) -> None:
-    for a in (surface, base):
-        for knots, degree in ((a.knots_u, a.degree_u), (a.knots_v, a.degree_v)):
-            if knots[0] != knots[degree] or knots[-1] != knots[-degree - 1]:
-                raise ValueError("surface: expected clamped knots, got open ends; repeat the end knots")
-    if not (np.array_equal(surface.knots_u, base.knots_u) and np.array_equal(surface.knots_v, base.knots_v)):
-        raise ValueError("base: expected the knots of the surface, got others; make both from one ridge")
-    size = np.ptp(base.poles, axis=(0, 1)).max()
-    gap = max(np.abs(surface.poles[:, k] - base.poles[:, k]).max() for k in (0, -1))
-    if gap > 1e-9 * size:
-        raise ValueError(
-            f"base: expected the borders of the surface, they are {gap:.3g} apart; make both from one ridge"
-        )
-
-
-def _check_loops(loops: list[Loop]) -> None:
-    """Raise ValueError where the border crosses itself."""
-    lines = [_pieces_of(loop.polyline[:: 1 + len(loop.polyline) // 200]) for loop in loops]
-    for k, line in enumerate(lines):
-        i = np.arange(len(line))
-        apart = np.abs(i[:, None] - i)
-        meet = meetings(line, line) & (apart > 1) & (apart < len(line) - 1)
-        if meet.any() or any(cross(line, other) for other in lines[:k]):
-            raise ValueError("surface: expected a border that does not cross itself, it does; move the path")
-
-
-def _pieces_of(line: Floats) -> Floats:
-    return np.stack([line, np.roll(line, -1, axis=0)], axis=1)
-
-
-def _build(host: TopoDS_Shape, face: TopoDS_Face, surface: Surface, base: Surface, expected: float) -> Change:
-    maker = Maker(surface, base, surface_on(face), face)
-    loops = maker.ring() if surface.closed[0] else [maker.open_border()]
-    pairs = [maker.hole(loop) for loop in loops]
-    _check_loops(pairs)
-    new = [maker.ridge_face(loops), *maker.caps(loops), *_split_face(face, maker.own, pairs)]
-    solid = _replaced(host, face, new)
-    return Change((face,), solid, tuple(new), base, expected)
-
-
-def _split_face(
-    face: TopoDS_Face, own: list[tuple[TopoDS_Wire, Floats]], loops: list[Loop]
-) -> list[TopoDS_Face]:
-    """The face with the outer loop as a hole; with two loops also the island within the inner one."""
-    areas = [signed_area(loop.polyline) for loop in loops]
-    outer = int(np.argmax(np.abs(areas)))
-    if areas[outer] > 0:
-        raise ValueError(
-            "surface: expected du x dv away from the host's material, "
-            "it points inwards; turn the surface round"
-        )
-    everything = np.concatenate([segments for _, segments in own])
-    seams = seams_of(face)
-    if len(seams) and any(cross(_pieces_of(loop.polyline), seams) for loop in loops):
-        raise SeamError("surface: expected a border clear of the face's seam, it runs over it")
-    lines = [
-        np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in (loop.polyline for loop in loops)
-    ]
-    around = np.concatenate(lines)
-    island = []
-    for k, (wire, segments) in enumerate(own):
-        if cross(around, segments):
-            raise ValueError(
-                "surface: expected a border within the face, it leaves the face's outline; move the path"
-                if k == 0
-                else "surface: expected a border clear of holes and earlier ridges, "
-                "it overlaps one; move the path"
-            )
-        if k and inside(segments[:1, 0], lines[outer])[0]:
-            if len(loops) == 1 or inside(segments[:1, 0], around)[0]:
-                raise ValueError(
-                    "surface: expected a footprint clear of holes and earlier ridges, it covers one; "
-                    "move the path"
-                )
-            island.append(wire)
-    if not inside(loops[outer].polyline[:1], everything)[0]:
-        raise ValueError("surface: expected a border within the face, it lies outside; move the path")
-    kept = [wire for wire, _ in own if not any(wire.IsSame(other) for other in island)]
-    faces = [_face_like(face, [*kept, loops[outer].wire])]
-    if len(loops) == 2:
-        faces.append(_face_like(face, [loops[1 - outer].wire, *island]))
-    return faces
-
-
-def _face_like(face: TopoDS_Face, wires: list[TopoDS_Wire]) -> TopoDS_Face:
-    """A new face on the same surface with these wires, oriented as the old one."""
-    build, where, f = BRep_Builder(), TopLoc_Location(), TopoDS_Face()
-    geometry: Geom_Surface = BRep_Tool.Surface_s(face, where)
-    build.MakeFace(f, geometry, where, BRep_Tool.Tolerance_s(face))
-    for wire in wires:
-        build.Add(f, wire)
-    return TopoDS.Face_s(f.Oriented(face.Orientation()))
+def _changed(host: TopoDS_Shape, site: Site, h: float, rough: bool) -> Change:
+    site.volume.check(h)
+    maker = Maker(site, h)
+    border = maker.border()
+    grown = maker.ridge_face(border)
+    new, ground = [grown, *maker.caps(border)], maker.ground(border)
+    solid = _replaced(host, site.face, [*new, *ground])
+    expected = site.volume.at(h)
+    return Change((site.face,), solid, tuple(new), site.base, expected, tuple(ground), site.ground, rough)
 
 
 def _replaced(host: TopoDS_Shape, face: TopoDS_Face, new: list[TopoDS_Face]) -> TopoDS_Solid:

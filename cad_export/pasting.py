@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import cadquery as cq
 import numpy as np
@@ -19,10 +20,10 @@ from cad_export.carried import faces_of, record_of
 from cad_export.check import subshapes
 from cad_export.face_base import FaceBase, face_base, vector
 from cad_export.geometry import topods
-from cad_export.inset import face_with, inset
+from cad_export.inset import face_of, inset_at
 from cad_export.paste_history import Placement, remember
+from cad_export.site import Site
 from ridgefeature.base import geodesic_curvature
-from ridgefeature.bspline import Surface
 from ridgefeature.fitting import FITS
 from ridgefeature.merge import LEAST_BORDER
 from ridgefeature.ridge import Ridge
@@ -65,17 +66,13 @@ def paste(
     if fit not in FITS:
         raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
     solid = _solid_of(host)
-    chosen = _face_of(solid, face, path, at)
+    chosen = face_of(solid, _face_of(solid, face, path, at))
     stand = _stand(_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
-    surface, foot = stand.surface(h, w), stand.surface(0, w)
-    result, told = inset(solid, chosen, surface, foot, check=check)
+    result, grown, told = inset_at(solid, stand.site(h, w), h, check)
     if report is not None:
         report.update(asdict(told))
     options = {"fit": fit, "scale": scale, "mirror": mirror, "reverse": reverse}
     place = Placement(stand.middle, at, direction, path, options, told.volume_added)
-    grown = face_with(
-        result, surface, 0.0 if told.method == "inset" else _SUNK * np.abs(surface.poles - foot.poles).max()
-    )
     remember(solid, result, grown, record_of(ridge, h, w, name), place)
     return cq.Solid(result)
 
@@ -85,19 +82,22 @@ class _Stand:
     """A ridge on the base of one place of a host's face, and what identified them, held."""
 
     held: tuple[Any, ...]
+    face: TopoDS_Face
     base: FaceBase
     ridge: Ridge
-    feet: dict[float, Surface] = field(default_factory=dict)
+    sites: dict[float, Site] = field(default_factory=dict)
 
-    def surface(self, h: float, w: float) -> Surface:
-        """The surface at these rates; for h = 0 remembered."""
-        if h == 0 and w in self.feet:
-            return self.feet[w]
-        sized = self.ridge if h == 1 and w == 1 else self.ridge.resized(h=h, w=w)
-        found = sized.surface(self.base)
-        if h == 0:
-            self.feet[w] = found
-        return found
+    def site(self, h: float, w: float) -> Site:
+        """The site for these rates: one for all h, since a surface is affine in its height."""
+        self.ridge.resized(h=h, w=w)  # refuses rates that are none
+        if w not in self.sites:
+            surface, base = (self.ridge.resized(h=h, w=w).surface(self.base) for h in (1, 0))
+            # The border of the flanks stays at all widths, and with it what is left of the face.
+            like = next((site.ground for site in self.sites.values()), None)
+            self.sites[w] = Site(self.face, surface, base, shared=like)
+            while len(self.sites) > _KEPT_WIDTHS:
+                self.sites.pop(next(iter(self.sites)))
+        return self.sites[w]
 
     @property
     def middle(self) -> tuple[float, float, float]:
@@ -106,11 +106,10 @@ class _Stand:
         return x, y, z
 
 
-_SUNK = 1e-3
-"""How far the face of a fused ridge may lie off its surface, in heights."""
 _UNFOLDED = 0.85
 """Breadth of a flank in radii of the path's bend."""
 _STANDS: OrderedDict[tuple[Any, ...], _Stand] = OrderedDict()
+_KEPT_WIDTHS = 4
 _KEPT = 16
 """Stands that are remembered: a slider pastes again and again at one place."""
 
@@ -146,7 +145,7 @@ def _stand(
             mirror=mirror,
             reverse=reverse,
         )
-        _STANDS[key] = _Stand(held, base, fitted)
+        _STANDS[key] = _Stand(held, face, base, fitted)
         while len(_STANDS) > _KEPT:
             _STANDS.popitem(last=False)
     return _STANDS[key]
@@ -176,8 +175,13 @@ def _room(ridge: Ridge) -> NDArray[np.float64]:
     return np.asarray(_UNFOLDED / np.maximum(near, 1e-300), dtype=np.float64)
 
 
+_BENT: WeakKeyDictionary[Ridge, bool] = WeakKeyDictionary()
+
+
 def _is_bent(ridge: Ridge) -> bool:
-    return bool((_room(ridge) < ridge.border).any())
+    if ridge not in _BENT:  # a Ridge does not change
+        _BENT[ridge] = bool((_room(ridge) < ridge.border).any())
+    return _BENT[ridge]
 
 
 def _narrowed(ridge: Ridge, w: float) -> Ridge:

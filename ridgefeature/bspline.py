@@ -56,7 +56,7 @@ class Curve:
         at = np.asarray(t, dtype=np.float64)
         first, basis = local_basis(self.knots, self.degree, at.ravel(), derivative)
         near = self.poles[first[:, None] + np.arange(self.degree + 1)]
-        return np.einsum("mi,mid->md", basis, near).reshape(*at.shape, -1)
+        return np.einsum("mi,mid->md", basis, near).reshape(*at.shape, self.poles.shape[1])
 
     def arc_length(self, t0: ArrayLike | None = None, t1: ArrayLike | None = None) -> Any:
         """Arc length from t0 to t1 (broadcast; negative backwards), by default of the whole curve."""

@@ -14,8 +14,8 @@ from OCP.TopoDS import TopoDS, TopoDS_Shell, TopoDS_Solid
 
 from cad_export.certificate import Change, certify, check_shape, free_mesh_edges
 from cad_export.check import subshapes
-from cad_export.end_caps import volume_between
 from cad_export.inset import inset
+from cad_export.volume_by_height import volume_between
 
 SURFACE, BASE = flat_ridge(1.0, z=5.0), flat_ridge(0.0, z=5.0)
 
