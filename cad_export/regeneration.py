@@ -50,8 +50,8 @@ def regenerate(
     solids = subshapes(shape, TopAbs_SOLID)
     if len(solids) != 1:
         raise ValueError(
-            f"part: expected one solid, got {len(solids)}; give one of them, which are in "
-            "cq.Shape.cast(shape).Solids()"
+            f"part: expected one solid, got {len(solids)}; give one of them: those of a STEP file "
+            "are cq.Shape.cast(cad_export.read_step(file)).Solids()"
         )
     chain = _chain(shape, pasted)
     _check_name(name, [p.record.name for p in chain], [p.record.name for p in pasted])

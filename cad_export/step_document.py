@@ -87,9 +87,7 @@ def features_of(made: TDocStd_Document) -> list[tuple[TopoDS_Face, Carried]]:
 def _parts(label: TDF_Label, place: TopLoc_Location) -> Iterator[tuple[TopoDS_Shape, TopLoc_Location]]:
     """Shapes of the parts under a label, in their own frames, with their places; in the file's order."""
     if XCAFDoc_ShapeTool.IsReference_s(label):
-        part = TDF_Label()
-        XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
-        yield from _parts(part, place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label)))
+        yield from _parts(_part_of(label), place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label)))
     elif XCAFDoc_ShapeTool.IsAssembly_s(label):
         components = label_sequence()
         XCAFDoc_ShapeTool.GetComponents_s(label, components)
@@ -121,29 +119,38 @@ def _has_colour(label: TDF_Label) -> bool:
 
 
 def _name_labels(made: TDocStd_Document) -> None:
-    """Write names as STEP has them; a component without one gets that of its part."""
+    """Write names as STEP has them.
+
+    A component without a name gets that of its part, and what holds a lone part gets that part's: CadQuery
+    leaves the first of them out for assemblies in assemblies, the second for an assembly of its own shape.
+    """
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(made.Main())
     labels = label_sequence()
     shapes.GetShapes(labels)
     for label in _items(labels):
-        inner = label_sequence()
+        inner, components = label_sequence(), label_sequence()
         XCAFDoc_ShapeTool.GetSubShapes_s(label, inner)
-        _name_as_step(label, *_items(inner))
+        XCAFDoc_ShapeTool.GetComponents_s(label, components)
+        for part in _items(inner):
+            _set_name(part, _name(part))
+        for component in _items(components):
+            _set_name(component, _name(component) or _name(_part_of(component)))
+    for label in _items(labels):  # last, since components were named after them
         components = label_sequence()
         XCAFDoc_ShapeTool.GetComponents_s(label, components)
-        for component in _items(components):
-            part = TDF_Label()
-            XCAFDoc_ShapeTool.GetReferredShape_s(component, part)
-            if _name(component):
-                _name_as_step(component)
-            elif _name(part):
-                TDataStd_Name.Set_s(component, TCollection_ExtendedString(directives(_name(part))))
+        first = _name(components.Value(1)) if components.Length() else ""
+        _set_name(label, _name(label) or first)
 
 
-def _name_as_step(*labels: TDF_Label) -> None:
-    for label in labels:
-        if _name(label):
-            TDataStd_Name.Set_s(label, TCollection_ExtendedString(directives(_name(label))))
+def _part_of(component: TDF_Label) -> TDF_Label:
+    part = TDF_Label()
+    XCAFDoc_ShapeTool.GetReferredShape_s(component, part)
+    return part
+
+
+def _set_name(label: TDF_Label, name: str) -> None:
+    if name:
+        TDataStd_Name.Set_s(label, TCollection_ExtendedString(directives(name)))
 
 
 def _name(label: TDF_Label) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import cadquery as cq
 import numpy as np
 import pytest
+from freecad_tools import inspect_step, needs_freecad, run_freecad
 from OCP.XCAFDoc import XCAFDoc_ShapeTool
 from oracles import spiral_ridge
 
@@ -162,3 +163,21 @@ def test_what_cannot_be_written_says_why(assembly: cq.Assembly, tmp_path: Path) 
     with pytest.raises(ValueError, match="expected a Ridge for rates h=2, w=1, got Assembly"):
         cx.step(assembly, tmp_path / "a.step", h=2)
     assert list(tmp_path.iterdir()) == []
+
+
+_LABELS = """
+import FreeCAD, Import
+document = FreeCAD.newDocument()
+Import.insert(path, document.Name)
+result = {"labels": [found.Label for found in document.Objects]}
+"""
+
+
+@needs_freecad
+def test_freecad_shows_the_names_and_all_parts(slab: cq.Solid, file: Path, tmp_path: Path) -> None:
+    found = inspect_step(file)
+    assert (found["solids"], found["valid"], found["closed_mesh"]) == (5, True, True)
+    # one part only: version 0.20 without a screen crashes on every assembly of several, CadQuery's own too
+    for source, label in ((slab, "Maß"), (cq.Assembly(slab, name="Größe's"), "Größe's")):
+        path = cx.step(source, tmp_path / "Maß.step")
+        assert run_freecad(_LABELS, path=str(path))["labels"] == [label]
