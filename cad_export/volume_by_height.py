@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.basis import basis_matrix
+from ridgefeature.basis import local_basis
 from ridgefeature.bspline import Surface
 
 Floats = NDArray[np.float64]
@@ -50,19 +50,20 @@ class VolumeByHeight:
     @cached_property
     def _worked_out(self) -> tuple[tuple[float, float, float], tuple[float, float]]:
         base, centre = self.base, self.base.poles.mean(axis=(0, 1))  # near by, so that no digits are lost
-        (u, wu), (v, wv) = _gauss(base.knots_u, base.degree_u), _gauss(base.knots_v, base.degree_v)
-        along = [basis_matrix(base.knots_u, base.degree_u, u, k) for k in (0, 1)]
-        across = [basis_matrix(base.knots_v, base.degree_v, v, k).T for k in (0, 1)]
+        u, v = _Nodes.of(base.knots_u, base.degree_u), _Nodes.of(base.knots_v, base.degree_v)
         poles = np.stack([base.poles - centre, self.surface.poles - base.poles])
-        # Coordinates first, (2, 3, m, k): whole arrays lie together, which the products below are faster on.
-        columns = [np.ascontiguousarray(np.moveaxis(poles, 3, 1)) @ b for b in across]
-        (f, d), (fu, du), (fv, dv) = (along[i] @ columns[k] for i, k in ((0, 0), (1, 0), (0, 1)))
+        rows = np.moveaxis(poles, 1, 0).reshape(poles.shape[1], -1)
+        # (v's poles, 2, 3, u's nodes): each coordinate is a whole array in the products below
+        along = [u.values(rows, k).reshape(-1, 2, poles.shape[2], 3).transpose(2, 1, 3, 0) for k in (0, 1)]
+        columns = [np.ascontiguousarray(a).reshape(len(a), -1) for a in along]
+        grids = (v.values(columns[i], k) for i, k in ((0, 0), (1, 0), (0, 1)))
+        (f, d), (fu, du), (fv, dv) = (np.moveaxis(g.reshape(len(g), 2, 3, -1), 0, 2) for g in grids)
         normals = _cross(fu, fv), _cross(fu, dv) + _cross(du, fv), _cross(du, dv)
-        flux = [[float(wu @ _dot(p, n) @ wv) / 3 for n in normals] for p in (f, d)]
-        caps = _caps_flux(base, poles, 1.0), _caps_flux(base, poles, -1.0)
+        flux = [[float(v.weights @ _dot(p, n) @ u.weights) / 3 for n in normals] for p in (f, d)]
+        caps = [0.0, 0.0] if base.closed[0] else _caps(poles, v)
         volumes = (
-            flux[0][1] + flux[1][0] + 0.5 * (caps[0] - caps[1]),
-            flux[0][2] + flux[1][1] + 0.5 * (caps[0] + caps[1]),
+            flux[0][1] + flux[1][0] + caps[0],
+            flux[0][2] + flux[1][1] + caps[1],
             flux[1][2],
         )
         return volumes, _limits(*(_dot(n, normals[0]) for n in normals))
@@ -96,26 +97,46 @@ def _advice(low: float, high: float) -> str:
     return f"stay {' and '.join(bounds)}, or use a path with wider bends"
 
 
-def _caps_flux(base: Surface, poles: Floats, h: float) -> float:
-    """The caps' part at height h: ruled faces from the base's end rows to the ridge's."""
-    if base.closed[0]:
-        return 0.0
-    up = np.array([0.0, 0.0, 1.0, 1.0])
-    first, last = (
-        Surface(
-            np.stack([poles[0, k], poles[0, k] + h * poles[1, k]], axis=1), base.knots_v, up, base.degree_v, 1
-        ).flux()
-        for k in (0, -1)
-    )
-    return last - first
+def _caps(poles: Floats, v: _Nodes) -> list[float]:
+    """The caps' part in the volume, of h and of h^2: ruled faces from the base's end rows to the ridge's."""
+    rows = poles[:, [0, -1]].transpose(2, 1, 0, 3)  # (v's poles, end, base or rise, 3)
+    flat = rows.reshape(len(rows), -1)
+    values, rates = (np.moveaxis(v.values(flat, k).reshape(-1, 2, 2, 3), 0, 3) for k in (0, 1))
+    parts = [0.0, 0.0]
+    for end, sign in enumerate((-1, 1)):
+        (f, d), (df, dd) = (x[end] for x in (values, rates))
+        parts[0] += sign * float(v.weights @ _dot(f, _cross(df, d))) / 3
+        parts[1] += sign * float(v.weights @ _dot(f, _cross(dd, d))) / 6
+    return parts
 
 
-def _gauss(knots: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Nodes and weights, exact for the products of three splines of the degree."""
-    x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
-    breaks = np.unique(knots)
-    half = 0.5 * np.diff(breaks)[:, None]
-    return (breaks[:-1, None] + half * (1.0 + x)).ravel(), (half * w).ravel()
+@dataclass(frozen=True, eq=False)
+class _Nodes:
+    """Gauss-Legendre nodes in every span of a clamped spline, exact for products of three such splines.
+
+    first: the first pole that bears on a span (k,); basis: of values and derivatives, (k, n, degree + 1).
+    """
+
+    first: NDArray[np.intp]
+    basis: tuple[Floats, Floats]
+    weights: Floats
+
+    @staticmethod
+    def of(knots: Floats, degree: int) -> _Nodes:
+        x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
+        breaks = np.unique(knots)
+        half = 0.5 * np.diff(breaks)[:, None]
+        nodes = (breaks[:-1, None] + half * (1.0 + x)).ravel()
+        found = [local_basis(knots, degree, nodes, k) for k in (0, 1)]
+        shape = len(half), len(x), degree + 1
+        value, rate = (basis.reshape(shape) for _, basis in found)
+        return _Nodes(found[0][0][:: len(x)], (value, rate), (half * w).ravel())
+
+    def values(self, poles: Floats, derivative: int = 0) -> Floats:
+        """Values (all nodes, m) of splines with the poles (n, m)."""
+        basis = self.basis[derivative]
+        near = poles[self.first[:, None] + np.arange(basis.shape[2])]
+        return np.matmul(basis, near).reshape(-1, poles.shape[1])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
