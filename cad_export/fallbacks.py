@@ -1,9 +1,9 @@
 """Where a ridge cannot be set into one face: faces split at their seams, or a block fused with the host.
 
-OCP only, no cadquery. First the border is split where it runs over seams (`split_inset`). Where that cannot be
-done a block under the ridge is fused with the host, or cut out of it. The block's ridge is sunk by a little, as
-OCCT's boolean operations lose or tear what only touches; so the solid's ridge face is the surface moved by that
-much, and trimmed at its feet.
+OCP only, no cadquery. First the border is split where it runs over seams (`split_inset`). Where that cannot
+be done a block under the ridge is fused with the host, or cut out of it. The block's ridge is sunk by a
+little, as OCCT's boolean operations lose or tear what only touches; so the solid's ridge face is the surface
+moved by that much, and trimmed at its feet.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ _HOVER = 0.05
 def fallback(host: TopoDS_Shape, site: Site, h: float, check: bool = True) -> tuple[Change, str]:
     """The host with a site's surface at height h, its footprint over a seam or several faces; the method.
 
-    "split seam": over seams, once round the face, or over other faces on its surface; exact. "sunk fuse": where
-    the border runs along a seam, or over faces on other surfaces that follow the base closely. Either has
-    passed the certificate. The host is not altered. Raises ValueError, saying what to change, where neither
-    can be right.
+    "split seam": over seams, once round the face, or over other faces on its surface; exact. "sunk fuse":
+    where the border runs along a seam, or over faces on other surfaces that follow the base closely. Either
+    has passed the certificate. The host is not altered. Raises ValueError, saying what to change, where
+    neither can be right.
     """
     try:
         change = split_inset(host, site, h)
@@ -53,6 +53,10 @@ def fallback(host: TopoDS_Shape, site: Site, h: float, check: bool = True) -> tu
         pass
     except OffFacesError as error:
         _check_on_host(host, site, h, str(error))
+        try:
+            return sunk_fuse(host, site.at(h), site.base, check), "sunk fuse"
+        except ValueError as failed:
+            raise ValueError(f"{error} ({failed})") from failed
     return sunk_fuse(host, site.at(h), site.base, check), "sunk fuse"
 
 
@@ -66,9 +70,8 @@ def _check_on_host(host: TopoDS_Shape, site: Site, h: float, message: str) -> No
         vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
         off = min(BRepExtrema_DistShapeShape(vertex, shell).Value() for shell in shells)
         if off > most:
-            raise ValueError(
-                f"{message} (the host is {off:.3g} off near {np.round(point, 4).tolist()}, more than {most:.3g})"
-            )
+            where = np.round(point, 4).tolist()
+            raise ValueError(f"{message} (near {where} the host is {off:.3g} off, more than {most:.3g})")
 
 
 def sunk_fuse(host: TopoDS_Shape, surface: Surface, base: Surface, check: bool = True) -> Change:

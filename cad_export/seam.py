@@ -7,7 +7,6 @@ from what remains of their edges. No surface is turned or refitted, and all othe
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import replace
 from functools import cached_property
 
@@ -20,7 +19,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from cad_export.certificate import Change
 from cad_export.check import subshapes
-from cad_export.crossings import Crossing, Stretch, crossings, cut_edges, outward, same_surface
+from cad_export.crossings import Crossing, CutEdge, Stretch, crossings, cut_edges, outward, same_surface
 from cad_export.footprint import HostSurface, cross, curve2d, inside, on_host, surface_on, wires_of
 from cad_export.geometry import DEGENERATE
 from cad_export.inset_edges import Maker, Piece
@@ -34,6 +33,10 @@ Floats = NDArray[np.float64]
 _LEAVES = "surface: expected a border within the face, it leaves the face's outline; move the path"
 _NOWHERE = np.empty((0, 2))
 _MEETS_HOLE = "surface: expected a border clear of holes and earlier ridges, it overlaps one; move the path"
+
+
+class OffFacesError(ValueError):
+    """The footprint leaves the face, and the faces that go on from it on the same surface."""
 
 
 class CutSite(Site):
@@ -74,8 +77,9 @@ def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
     """The host with the surface at height h set into the site's face and others on the same surface.
 
     host: the solid that holds the face; not altered. The change's first new face is the ridge's. Raises
-    SeamError where the border runs along a seam or over its end; ValueError, saying what to change, where the
-    border is off the surface, leaves its faces, or meets or covers holes and earlier ridges in them.
+    SeamError where the border runs along a seam or over its end; OffFacesError where it leaves these faces;
+    ValueError, saying what to change, where it is off the surface, or meets or covers holes and earlier
+    ridges.
     """
     place = CutSite(site.face, site.surface, site.base)
     place.volume.check(h)
@@ -89,8 +93,11 @@ def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
     made = [maker.ridge_face(border), *maker.caps(border)]
     parts = [_parts(loop, met) for loop, met in zip(loops, found, strict=True)]
     new = [with_edges(face, _by_edge(loops, parts)) for face in made]
+    halves = [[half_edges(wire, face) for wire in wires_of(face)] for face in sheet]
+    laid = [_laid(part, sheet, halves, place) for loop in parts for some in loop for part in some]
+    _check_clear(laid, halves, cuts)
     kept = kept_parts(cuts, [x for met in found for x in met], sheet)
-    old, ground = _divided(sheet, kept, [part for loop in parts for some in loop for part in some], place)
+    old, ground = _divided(sheet, halves, kept, laid)
     solid = with_faces(host, old, [*new, *ground])
     return Change(tuple(old), solid, tuple(new), place.base, place.volume.at(h), tuple(ground))
 
@@ -127,27 +134,32 @@ def _by_edge(loops: list[list[Stretch]], parts: list[list[list[Stretch]]]) -> Ed
     return EdgeParts(whole, [[part.edge for part in some] for loop in parts for some in loop])
 
 
+def _check_clear(
+    laid: list[tuple[int, HalfEdge]], halves: list[list[list[HalfEdge]]], cuts: list[CutEdge]
+) -> None:
+    """Raise ValueError where the border meets edges of its faces that it may not cross."""
+    cut = EdgeParts([c.edge for c in cuts], [])
+    for k, wires in enumerate(halves):
+        for i, wire in enumerate(wires):
+            fixed = [half.segments for half in wire if cut.index(half.edge) < 0]
+            if fixed and any(cross(half.segments, np.concatenate(fixed)) for j, half in laid if j == k):
+                raise ValueError(_MEETS_HOLE) if i else OffFacesError(_LEAVES)
+
+
 def _divided(
-    sheet: list[TopoDS_Face], kept: KeptParts, border: list[Stretch], site: Site
+    sheet: list[TopoDS_Face],
+    halves: list[list[list[HalfEdge]]],
+    kept: KeptParts,
+    laid: list[tuple[int, HalfEdge]],
 ) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
     """The faces that the border meets, and those that remain of them."""
-    own = [[half_edges(wire, face) for wire in wires_of(face)] for face in sheet]
-    added: dict[int, list[HalfEdge]] = defaultdict(list)
-    for part in border:
-        k, half = _laid(part, sheet, own, site)
-        added[k].append(half)
-    old, ground = [], []
-    for k, (face, wires) in enumerate(zip(sheet, own, strict=True)):
-        for i, wire in enumerate(wires):
-            fixed = [half.segments for half in wire if not kept.is_cut(half.edge)]
-            if fixed and any(cross(half.segments, np.concatenate(fixed)) for half in added[k]):
-                raise ValueError(_MEETS_HOLE if i else _LEAVES)
-        halves = [half for wire in wires for half in wire]
-        if added[k] or any(kept.is_changed(half.edge) for half in halves):
-            remaining = [part for half in halves for part in kept.of(half, face)]
+    old, remaining = [], []
+    for k, (face, wires) in enumerate(zip(sheet, halves, strict=True)):
+        own, new = [half for wire in wires for half in wire], [half for j, half in laid if j == k]
+        if new or any(kept.is_changed(half.edge) for half in own):
             old.append(face)
-            ground += regions(face, [*remaining, *added[k]])
-    return old, ground
+            remaining += regions(face, [*(part for half in own for part in kept.of(half, face)), *new])
+    return old, remaining
 
 
 def _laid(
@@ -167,7 +179,7 @@ def _laid(
         for move in _moves(uv[0], segments, surface.periods):
             if inside(uv + move, segments)[0]:
                 return k, _half_on(part, face, uv[0] + move, site)
-    raise ValueError(_LEAVES)
+    raise OffFacesError(_LEAVES)
 
 
 def _moves(uv: Floats, segments: Floats, periods: tuple[float, float]) -> list[Floats]:
@@ -185,7 +197,7 @@ def _half_on(part: Stretch, face: TopoDS_Face, at: Floats, site: Site) -> HalfEd
     surface, middle = surface_on(face), 0.5 * (part.span[0] + part.span[1])
     found = on_host(surface, part.curve, part.span, None, part.forward)
     if not found.distance <= ON_HOST * site.breadth:
-        raise ValueError(_LEAVES)
+        raise OffFacesError(_LEAVES)
     period = np.array(surface.periods)
     move = period * np.round((at - found.flat(middle)) / np.where(period > 0, period, np.inf))
     where, build = TopLoc_Location(), BRep_Builder()
