@@ -160,6 +160,22 @@ def face_base(
     Raises ValueError, in words, where the strip of the ridge's borders leaves the face, lies on a hole of it,
     folds in a bend, or overlaps itself; for a path or `at` off the face, corners, no length, no direction.
     """
+    base, fitted = laid(face, ridge, path, at, direction, fit, mirror, reverse)
+    check_strip(base)
+    return base, fitted
+
+
+def laid(
+    face: Any,
+    ridge: Ridge,
+    path: Any = None,
+    at: Any = None,
+    direction: Any = None,
+    fit: str = "length",
+    mirror: bool = False,
+    reverse: bool = False,
+) -> tuple[FaceBase, Ridge]:
+    """face_base, without a look at whether the strip fits: it may fold, overlap itself or leave the face."""
     host = host_of(_face(face))
     if not isinstance(ridge, Ridge):
         raise ValueError(f"ridge: expected a Ridge, got {type(ridge).__name__}; register or load one first")
@@ -175,9 +191,7 @@ def face_base(
         goal = min(ridge.length, curve.length) if fit == "trim" else curve.length
         fitted, curve = fitted.stretched(goal, fit), curve.cut(goal)
         fitted = joined(fitted) if curve.closed else fitted
-    base = FaceBase(host, curve, (fitted.arc_length, fitted.border))
-    check_strip(base)
-    return base, fitted
+    return FaceBase(host, curve, (fitted.arc_length, fitted.border)), fitted
 
 
 def _face(shape: Any) -> TopoDS_Face:
