@@ -169,7 +169,7 @@ def _laid(
 
     Its edge gets a parameter curve on the face.
     """
-    middle = part.curve(0.5 * (part.span[0] + part.span[1]))[None]
+    middle, is_in_hole = part.curve(0.5 * (part.span[0] + part.span[1]))[None], False
     for k, (face, wires) in enumerate(zip(sheet, own, strict=True)):
         surface = surface_on(face)
         segments = np.concatenate([half.segments for wire in wires for half in wire])
@@ -179,7 +179,9 @@ def _laid(
         for move in _moves(uv[0], segments, surface.periods):
             if inside(uv + move, segments)[0]:
                 return k, _half_on(part, face, uv[0] + move, site)
-    raise OffFacesError(_LEAVES)
+            outline = np.concatenate([half.segments for half in wires[0]])
+            is_in_hole |= bool(inside(uv + move, outline)[0])
+    raise ValueError(_MEETS_HOLE) if is_in_hole else OffFacesError(_LEAVES)
 
 
 def _moves(uv: Floats, segments: Floats, periods: tuple[float, float]) -> list[Floats]:
@@ -196,10 +198,14 @@ def _half_on(part: Stretch, face: TopoDS_Face, at: Floats, site: Site) -> HalfEd
     """A part of the border, its middle at parameters `at`, as a half-edge of the face around the ridge."""
     surface, middle = surface_on(face), 0.5 * (part.span[0] + part.span[1])
     found = on_host(surface, part.curve, part.span, None, part.forward)
-    if not found.distance <= ON_HOST * site.breadth:
-        raise OffFacesError(_LEAVES)
     period = np.array(surface.periods)
     move = period * np.round((at - found.flat(middle)) / np.where(period > 0, period, np.inf))
+    if move.any() and not found.distance <= ON_HOST * site.breadth:
+        # a surface that closes without being periodic has nothing there: begin on its own parameters
+        found = on_host(surface, part.curve, part.span, found.polyline[0] + move, part.forward)
+        move = np.zeros(2)
+    if not found.distance <= ON_HOST * site.breadth:
+        raise OffFacesError(_LEAVES)
     where, build = TopLoc_Location(), BRep_Builder()
     raw = BRep_Tool.Surface_s(face, where)
     flat = curve2d(replace(found.flat, poles=found.flat.poles + move))
