@@ -8,7 +8,7 @@ from what remains of their edges. No surface is turned or refitted, and all othe
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,12 @@ def _distance(surface: HostSurface, points: Floats) -> float:
     return float(np.linalg.norm(surface.points(uv) - points, axis=1).max())
 
 
+@lru_cache(maxsize=8)
+def _cut_site(site: Site) -> CutSite:
+    """The same site, kept: what does not depend on the height is worked out once."""
+    return CutSite(site.face, site.surface, site.base)
+
+
 def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
     """The host with the surface at height h set into the site's face and others on the same surface.
 
@@ -81,7 +87,7 @@ def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
     ValueError, saying what to change, where it is off the surface, or meets or covers holes and earlier
     ridges.
     """
-    place = CutSite(site.face, site.surface, site.base)
+    place = _cut_site(site)
     place.volume.check(h)
     _check_side(place)
     maker = Maker(place, h)
