@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
 from cad_export.face_path import FacePath, developed_path, follow, nearest, projected_path, settled
+from cad_export.flanks import narrowed
 from cad_export.geometry import topods
 from cad_export.host_surface import Host, host_of
-from cad_export.strip import check_strip, inner_point, longer_direction
+from cad_export.strip import check_strip, inner_point, longer_direction, samples_of
 from ridgefeature.base import developed
 from ridgefeature.fitting import joined, mirrored
 from ridgefeature.merge import along
@@ -143,6 +144,7 @@ def face_base(
     fit: str = "length",
     mirror: bool = False,
     reverse: bool = False,
+    w: float | None = None,
 ) -> tuple[FaceBase, Ridge]:
     """The base of a host face along a path, and the ridge fitted to it: on that stands ridge.surface(base).
 
@@ -156,12 +158,18 @@ def face_base(
     Ridge.stretched: "length" stretches the ridge to the path, "scale" scales it too, "trim" keeps it, cut
     where the path is shorter; a longer path is used up to the ridge's length. A closed path gives a closed
     base, on which the ridge's ends are blended into each other.
+    w: rate of width that the ridge will have at most; given, its flanks are narrowed where path or face would
+    fold them, but not the feet's own (see flanks.narrowed).
     mirror: what lay to the left of the ridge's path lies to its right. reverse: the ridge runs the other way.
     Raises ValueError, in words, where the strip of the ridge's borders leaves the face, lies on a hole of it,
     folds in a bend, or overlaps itself; for a path or `at` off the face, corners, no length, no direction.
     """
     base, fitted = laid(face, ridge, path, at, direction, fit, mirror, reverse)
-    check_strip(base)
+    strip = samples_of(base)
+    if w is not None and (slim := narrowed(strip, fitted, w)) is not fitted:
+        base, fitted = replace(base, reach=(slim.arc_length, slim.border), kept={}), slim
+        strip = samples_of(base)
+    check_strip(base, strip)
     return base, fitted
 
 

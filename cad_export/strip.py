@@ -108,17 +108,22 @@ def samples_of(base: _Strip) -> Samples:
     return Samples(s, breadth, y, x, points, normal, left, ahead, base.length, base.closed)
 
 
-def check_strip(base: _Strip) -> None:
+def check_strip(base: _Strip, samples: Samples | None = None) -> None:
     """Raise ValueError where the strip folds, overlaps itself, or is not inside the face."""
-    strip = samples_of(base)
+    strip = samples_of(base) if samples is None else samples
     check_folds(strip)
     check_overlap(strip)
     check_inside(strip, base.host)
 
 
+def speed_of(strip: Samples) -> Floats:
+    """(n, m): how far one goes along at the samples for a step along the path; below 0 where it folds."""
+    return np.asarray((strip.ahead * np.cross(strip.left, strip.normal)).sum(axis=-1), dtype=np.float64)
+
+
 def check_folds(strip: Samples) -> None:
     """Raise ValueError where the path bends tighter than the strip is broad."""
-    speed = (strip.ahead * np.cross(strip.left, strip.normal)).sum(axis=-1)
+    speed = speed_of(strip)
     i = int(speed.min(axis=1).argmin())
     if speed[i].min() < _LEAST_SPEED:
         raise ValueError(
