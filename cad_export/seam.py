@@ -79,10 +79,11 @@ def _cut_site(site: Site) -> CutSite:
     return CutSite(site.face, site.surface, site.base)
 
 
-def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
+def split_inset(host: TopoDS_Shape, site: Site, h: float, rough: bool = False) -> Change:
     """The host with the surface at height h set into the site's face and others on the same surface.
 
-    host: the solid that holds the face; not altered. The change's first new face is the ridge's. Raises
+    host: the solid that holds the face; not altered. rough: whether the fastest integration of the volume may
+    do. The change's first new face is the ridge's. Raises
     SeamError where the border runs along a seam or over its end; OffFacesError where it leaves these faces;
     ValueError, saying what to change, where it is off the surface, or meets or covers holes and earlier
     ridges.
@@ -105,7 +106,8 @@ def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
     kept = kept_parts(cuts, [x for met in found for x in met], sheet)
     old, ground = _divided(sheet, halves, kept, laid)
     solid = with_faces(host, old, [*new, *ground])
-    return Change(tuple(old), solid, tuple(new), place.base, place.volume.at(h), tuple(ground))
+    expected = place.volume.at(h)
+    return Change(tuple(old), solid, tuple(new), place.base, expected, tuple(ground), place.ground, rough)
 
 
 def _check_side(site: Site) -> None:
