@@ -21,6 +21,7 @@ from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
+from ridgefeature.verdict import no_ridge
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -105,6 +106,12 @@ def _track(
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
     track = finish_ends(full, settle(full, track, settings), settings)
+    why = no_ridge(rough, track, pick, extent, settings)
+    if why:
+        raise NoRidgeError(
+            f"no ridge at {_text(pick)}: {why}; pick a point on the ridge, or give direction=, width= and "
+            "height= as a start"
+        )
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )
