@@ -16,22 +16,23 @@ from ridgefeature.kernels.residual import OPTIONS
 Floats = NDArray[np.float64]
 
 _HUBER = 1.345
-_ROUNDS = 7
+ROUNDS = 7
+_FEW_ROUNDS = 4
 _SPLITS = 15
 _FEWEST = 6
 
 
 @njit(**OPTIONS)
-def robust_loss(design: Floats, z: Floats, scale: float, tuning: float) -> float:
+def robust_loss(design: Floats, z: Floats, scale: float, tuning: float, rounds: int = ROUNDS) -> float:
     """Smallest loss (Tukey's) of a linear model design (n, p) of z (n,) that reweighting finds.
 
-    Three rounds with Huber's weights, from least squares on, then Tukey's (Holland and Welsch 1977).
+    Least squares, two rounds with Huber's weights, then Tukey's (Holland and Welsch 1977).
     """
     n, p = design.shape
     normal, right = np.zeros((p, p)), np.zeros(p)
     r = z.copy()
     best = n * tuning * tuning / 6.0
-    for turn in range(_ROUNDS):
+    for turn in range(rounds):
         normal[:] = 0.0
         right[:] = 0.0
         for i in range(n):
@@ -105,14 +106,16 @@ def advantage(
     on_ridge = robust_loss(ridge, z, scale, tuning)
     smooth = robust_loss(powers(x, y, 3, 0), z, scale, tuning)
     planes = powers(x, y, 1, 3)
-    edge = n * tuning * tuning / 6.0
-    for k in range(_SPLITS):
-        at, beyond = -0.7 + 1.4 * k / (_SPLITS - 1), 0
+    edge, best = n * tuning * tuning / 6.0, -1
+    for k in range(_SPLITS + 1):  # all in a few rounds, then the best once more
+        at, beyond = -0.7 + 1.4 * (k if k < _SPLITS else best) / (_SPLITS - 1), 0
         for i in range(n):
             side = 1.0 if y[i] > at else 0.0
             beyond += y[i] > at
             for a in range(3):
                 planes[i, 3 + a] = side * planes[i, a]
         if _FEWEST <= beyond <= n - _FEWEST:
-            edge = min(edge, robust_loss(planes, z, scale, tuning))
+            loss = robust_loss(planes, z, scale, tuning, _FEW_ROUNDS if k < _SPLITS else ROUNDS)
+            if loss < edge:
+                edge, best = loss, k
     return 2.0 * (smooth - on_ridge), 2.0 * (edge - on_ridge)
