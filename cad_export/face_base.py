@@ -43,6 +43,8 @@ class FaceBase:
     reach: tuple[Floats, Floats]
     """Arc lengths (k,) and breadths (k,) of the strip to either side, for which polynomials are made."""
     kept: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
+    slim: bool = False
+    """Whether the flanks were narrowed."""
 
     @property
     def length(self) -> float:
@@ -145,6 +147,7 @@ def face_base(
     mirror: bool = False,
     reverse: bool = False,
     w: float | None = None,
+    beyond: bool = False,
 ) -> tuple[FaceBase, Ridge]:
     """The base of a host face along a path, and the ridge fitted to it: on that stands ridge.surface(base).
 
@@ -161,15 +164,16 @@ def face_base(
     w: rate of width that the ridge will have at most; given, its flanks are narrowed where path or face would
     fold them, but not the feet's own (see flanks.narrowed).
     mirror: what lay to the left of the ridge's path lies to its right. reverse: the ridge runs the other way.
+    beyond: the strip may leave the face over its outline, along the face's surface.
     Raises ValueError, in words, where the strip of the ridge's borders leaves the face, lies on a hole of it,
     folds in a bend, or overlaps itself; for a path or `at` off the face, corners, no length, no direction.
     """
     base, fitted = laid(face, ridge, path, at, direction, fit, mirror, reverse)
     strip = samples_of(base)
     if w is not None and (slim := narrowed(strip, fitted, w)) is not fitted:
-        base, fitted = replace(base, reach=(slim.arc_length, slim.border), kept={}), slim
+        base, fitted = replace(base, reach=(slim.arc_length, slim.border), kept={}, slim=True), slim
         strip = samples_of(base)
-    check_strip(base, strip)
+    check_strip(base, strip, beyond)
     return base, fitted
 
 
