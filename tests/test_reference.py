@@ -216,8 +216,10 @@ def test_the_same_seed_gives_the_same_bytes_and_every_kind_is_drawn() -> None:
     assert {kinds_of(seed)["path"] for seed in range(40)} == set(PATHS)
     assert kinds_of(2) == {key: one.kinds[key] for key in kinds_of(2)}
     assert draw(2, section="steep").kinds["section"] == "steep"
-    with pytest.raises(ValueError, match="expected kinds out of path"):
+    with pytest.raises(ValueError, match="colour=blue: expected one of path, host"):
         draw(0, colour="blue")
+    with pytest.raises(ValueError, match="expected one of ridge, groove"):
+        draw(0, kind="bump")
 
 
 @pytest.mark.parametrize("path", PATHS)

@@ -29,6 +29,19 @@ VERSION = 1
 """Changes with every change of the drawn cases."""
 PATHS = ("straight", "S", "spiral", "kink", "ring")
 HOSTS = ("plane", "cylinder along", "cylinder across", "sphere", "saddle")
+CHOICES = {
+    "path": PATHS,
+    "host": HOSTS,
+    "section": tuple(PROFILES),
+    "sampling": ("grid", "random"),
+    "start": ("abrupt", "abrupt", "fading", "border"),
+    "end": ("abrupt", "abrupt", "fading", "border"),
+    "gap": ("none", "none", "none", "gap"),
+    "outliers": ("none", "none", "below 10 %", "10 to 20 %"),
+    "banding": ("none", "none", "none", "banding"),
+    "kind": ("ridge",) * 9 + ("groove",),
+}
+"""The kinds of a case and their values, each as often as it stands here."""
 _MOST_POINTS = 150_000
 
 
@@ -57,8 +70,7 @@ class Case:
 def draw(seed: int, **fixed: str) -> Case:
     """The reference case of a seed. fixed: kinds to hold, such as path="ring" or outliers="none".
 
-    Every kind is drawn evenly: path of PATHS, host of HOSTS, section of PROFILES, sampling "grid" or
-    "random"; and unevenly: ends, gap, outliers, banding, groove.
+    Raises ValueError for kinds that are not in CHOICES.
     """
     random = _random(seed)
     kinds = _kinds(random, fixed)
@@ -88,24 +100,11 @@ def _random(seed: int) -> np.random.Generator:
 def _kinds(random: np.random.Generator, fixed: dict[str, str]) -> dict[str, str]:
     """The kinds of a case; each is drawn whether it is held or not, so that holding one changes no other."""
 
-    def one(*names: str) -> str:
-        return str(names[int(random.integers(len(names)))])
-
-    drawn = {
-        "path": one(*PATHS),
-        "host": one(*HOSTS),
-        "section": one(*PROFILES),
-        "sampling": one("grid", "random"),
-        "start": one("abrupt", "abrupt", "fading", "border"),
-        "end": one("abrupt", "abrupt", "fading", "border"),
-        "gap": one("none", "none", "none", "gap"),
-        "outliers": one("none", "none", "below 10 %", "10 to 20 %"),
-        "banding": one("none", "none", "none", "banding"),
-        "kind": one(*["ridge"] * 9, "groove"),
-    }
-    unknown = set(fixed) - set(drawn)
-    if unknown:
-        raise ValueError(f"expected kinds out of {', '.join(drawn)}; got {', '.join(sorted(unknown))}")
+    drawn = {key: str(names[int(random.integers(len(names)))]) for key, names in CHOICES.items()}
+    for key, value in fixed.items():
+        if value not in CHOICES.get(key, ()):
+            known = dict.fromkeys(CHOICES.get(key, CHOICES))
+            raise ValueError(f"kind {key}={value}: expected one of {', '.join(known)}")
     drawn |= fixed
     if drawn["path"] == "ring":
         # A curve of constant curvature does not close on a saddle.

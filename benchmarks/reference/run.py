@@ -3,8 +3,8 @@
     python benchmarks/reference/run.py [--quick] [--jobs 2] [--cases 500] [--first 0] [--only KIND]
                                        [--table F.csv] [--failures DIR]
 
-KIND is one of the parts campaign, flat, clicks, rings; or holds a kind of case in the campaign alone, such as
-path=ring or section=steep. Deterministic. --failures writes a picture of every case that fails.
+KIND is one of the parts campaign, flat, clicks, rings; or holds kinds of case in the campaign alone, such as
+path=ring or host=sphere,section=steep. Deterministic. --failures writes a picture of every case that fails.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import numpy as np
 from report import Report, at_least, at_most, between
 
 from reference.flat import SURFACES
-from reference.make import VERSION
+from reference.make import VERSION, kinds_of
 from reference.measure import Row, one_case, one_flat, one_of_clicks
 from reference.score import Score
 
@@ -188,7 +188,10 @@ def main() -> None:
             options.failures.mkdir(parents=True, exist_ok=True)
         work = partial(one_case, failures=options.failures, fixed=fixed)
         rows = list(each(jobs, work, range(first, first + options.cases)))
+        if options.table is not None:
+            write_table(rows, options.table)
         campaign(report, rows)
+        print(by_kind(rows), file=sys.stderr, flush=True)
     if part in (None, "flat"):
         tasks = [(name, seed) for seed in range(3 if quick else 50) for name in SURFACES]
         flat(report, list(each(jobs, one_flat, tasks)))
@@ -202,8 +205,6 @@ def main() -> None:
     report.show()
     if rows:
         print("\n" + by_kind(rows))
-    if rows and options.table is not None:
-        write_table(rows, options.table)
 
 
 def _options() -> Namespace:
@@ -213,7 +214,7 @@ def _options() -> Namespace:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--cases", type=int)
     parser.add_argument("--first", type=int, default=0, help="seed of the first case")
-    parser.add_argument("--only", help=f"one of {', '.join(PARTS)}, or KIND=VALUE")
+    parser.add_argument("--only", help=f"one of {', '.join(PARTS)}, or KIND=VALUE,...")
     parser.add_argument("--table", type=File)
     parser.add_argument("--failures", type=File)
     options = parser.parse_args()
@@ -232,12 +233,13 @@ def _only(text: str | None) -> tuple[str | None, dict[str, str]]:
     """The part to run, None for all, and the kinds to hold."""
     if text is None or text in PARTS:
         return text, {}
-    key, equals, value = text.partition("=")
-    if not equals or key not in KINDS[:-1]:
-        raise ValueError(
-            f"--only: expected {', '.join(PARTS)} or KIND=VALUE with one of {', '.join(KINDS[:-1])}"
-        )
-    return "campaign", {key: value}
+    pairs = [pair.partition("=") for pair in text.split(",")]
+    if not all(equals and key in KINDS[:-1] for key, equals, _ in pairs):
+        known = ", ".join(KINDS[:-1])
+        raise ValueError(f"--only: expected {', '.join(PARTS)} or KIND=VALUE,... with KIND one of {known}")
+    fixed = {key: value for key, _, value in pairs}
+    kinds_of(0, **fixed)
+    return "campaign", fixed
 
 
 if __name__ == "__main__":
