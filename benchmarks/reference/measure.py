@@ -13,8 +13,16 @@ from reference.flat import ridge_free
 from reference.hosts import Array
 from reference.make import Case, clicks, draw
 from reference.score import from_ridge, score
+from ridgefeature.synthetic import Spiral
 
 Row = dict[str, Any]
+
+
+def warm_up() -> None:
+    """Compiles what a registration needs, so that no case's seconds hold that."""
+    spiral = Spiral()
+    at = (*spiral.spine(np.array(30.0))[:2], float(spiral.height(np.array(30.0))))
+    rf.register(spiral.points(10_000, noise=0.1), at=at)
 
 
 def registered(case: Case, click: Array | None = None) -> tuple[rf.Ridge | None, float, str]:

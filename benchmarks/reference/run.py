@@ -29,7 +29,7 @@ from report import Report, at_least, at_most, between
 
 from reference.flat import SURFACES
 from reference.make import VERSION, kinds_of
-from reference.measure import Row, one_case, one_flat, one_of_clicks
+from reference.measure import Row, one_case, one_flat, one_of_clicks, warm_up
 from reference.score import Score
 
 PARTS = ("campaign", "flat", "clicks", "rings")
@@ -39,10 +39,11 @@ KINDS = ("path", "host", "section", "sampling", "start", "end", "gap", "outliers
 def each(jobs: int, work: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
     """Results in the order of the tasks, from so many processes."""
     if jobs == 1:
+        warm_up()
         yield from map(work, tasks)
         return
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=warm_up) as pool:
         for n, result in enumerate(pool.map(work, tasks, chunksize=2), 1):
             if n % 50 == 0:
                 print(f"{n} done", file=sys.stderr, flush=True)
