@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, loss_of
 from ridgefeature.kernels import chain
-from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.march import GOES_ON, Track, reverse
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -119,17 +118,7 @@ def _extrapolated(places: Array, values: list[float]) -> tuple[float, float]:
 
 def _relength(template: Template, low: float, high: float) -> Template:
     """The patch from x = low to x = high of the template's own frame, on its bent path."""
-    middle = 0.5 * (low + high)
-    bend = template.trend[0]
-    turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
-    shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
-    return template.changed(
-        position=template.position + template.rotation @ shift,
-        rotation=template.rotation @ turn,
-        length=float(high - low),
-        height=float(template.height + template.trend[1] * middle),
-        width=float(max(template.width + template.trend[2] * middle, 0.5 * template.width)),
-    )
+    return template.slid(0.5 * (low + high)).changed(length=float(high - low))
 
 
 def place_ends(window: Window, track: Track, settings: Settings) -> Track:
