@@ -43,6 +43,8 @@ class Track:
     stop: tuple[str, str]
     misfit: Array | None = None
     """(2, m) number and sum of residuals by distance from the spine, once the track is settled."""
+    closed: bool = False
+    """Whether the first template follows the last: a ring."""
 
 
 def reverse(template: Template) -> Template:

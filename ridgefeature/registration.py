@@ -122,7 +122,7 @@ def _track(
         return track
     templates = tuple(with_section(t, section) for t in track.templates)
     # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
-    track = settle(full, settle(full, Track(templates, track.stop), settings), settings)
+    track = settle(full, settle(full, replace(track, templates=templates), settings), settings)
     return finish_ends(full, track, settings)
 
 
