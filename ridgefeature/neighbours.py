@@ -15,6 +15,11 @@ Array = NDArray[np.float64]
 LEAST_ADVANCE = 0.4
 """Least distance between centres along their common direction, in parts of their mean length."""
 _TIPPED = math.cos(math.radians(35.0))
+FEWEST = 4
+"""Templates of the smallest ring."""
+_HOME = 3
+"""How many of a march's first templates it may come back to: the very first may be a poor fit."""
+_SAME_WAY = math.cos(math.radians(50.0))
 _UNSURE = 2.0
 """Factor of the neighbours' standard deviations that an interpolated template has."""
 
@@ -42,6 +47,22 @@ def tipped(template: Template, near: list[Template]) -> bool:
     up = np.array([t.rotation[:, 2] for t in near])
     agree = bool(((up @ up.T) > _TIPPED).all())
     return agree and bool((up @ template.rotation[:, 2] < _TIPPED).all())
+
+
+def comes_home(template: Template, chain: list[Template], met: int) -> bool:
+    """Whether a template that lies on the met-th of a chain closes it: one of its first, the same way on.
+
+    Another ridge that crosses this one, or this one running into its own side, is no ring.
+    """
+    other = chain[met]
+    return (
+        met < _HOME
+        and len(chain) - met >= FEWEST
+        and bool(template.rotation[:, 0] @ other.rotation[:, 0] > _SAME_WAY)
+        and bool(template.rotation[:, 2] @ other.rotation[:, 2] > _SAME_WAY)
+        and 0.5 < template.height / other.height < 2.0
+        and 0.55 < template.width / other.width < 1.8
+    )
 
 
 def between(before: Template, after: Template, share: float = 0.5) -> Template:
