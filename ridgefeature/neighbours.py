@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,10 @@ LEAST_ADVANCE = 0.4
 _TIPPED = math.cos(math.radians(35.0))
 FEWEST = 4
 """Templates of the smallest ring."""
-_HOME = 3
+HOME = 3
 """How many of a march's first templates it may come back to: the very first may be a poor fit."""
+TYPICAL = 5
+"""Templates whose medians tell what a ridge is like."""
 _SAME_WAY = math.cos(math.radians(50.0))
 _UNSURE = 2.0
 """Factor of the neighbours' standard deviations that an interpolated template has."""
@@ -54,15 +57,21 @@ def comes_home(template: Template, chain: list[Template], met: int) -> bool:
 
     Another ridge that crosses this one, or this one running into its own side, is no ring.
     """
-    other = chain[met]
+    if met >= HOME or len(chain) - met < FEWEST:
+        return False
+    other, chord = chain[met], chain[met + 1].position - chain[met].position
+    ways = (other.rotation[:, 0], chord / np.linalg.norm(chord))
     return (
-        met < _HOME
-        and len(chain) - met >= FEWEST
-        and bool(template.rotation[:, 0] @ other.rotation[:, 0] > _SAME_WAY)
-        and bool(template.rotation[:, 2] @ other.rotation[:, 2] > _SAME_WAY)
-        and 0.5 < template.height / other.height < 2.0
-        and 0.55 < template.width / other.width < 1.8
+        max(float(template.rotation[:, 0] @ way) for way in ways) > _SAME_WAY
+        and float(template.rotation[:, 2] @ other.rotation[:, 2]) > _SAME_WAY
+        and alike(template, chain[met : met + TYPICAL])
     )
+
+
+def alike(template: Template, near: list[Template]) -> bool:
+    """Whether height and width of a template are near the medians of others."""
+    height, width = (median([getattr(t, name) for t in near]) for name in ("height", "width"))
+    return 0.5 < template.height / height < 2.0 and 0.55 < template.width / width < 1.8
 
 
 def between(before: Template, after: Template, share: float = 0.5) -> Template:

@@ -121,8 +121,8 @@ class Ridge(Stations):
         h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a
         function of arc length (k,) -> (k,). between: arc lengths (s0, s1) of the stretch that changes,
         blended smoothly inside it over a third of the stretch or one width, whichever is less; on a ring s1
-        may lie beyond the length, and the stretch then runs over the seam. Standard deviations follow; that of
-        a height made 0 is 0. Raises ValueError for both a rate and an absolute value, values that are not
+        may lie beyond the length, then the stretch runs over the seam. Standard deviations follow; that of a
+        height made 0 is 0. Raises ValueError for both a rate and an absolute value, values that are not
         finite or of a ring differ at both ends, w or width not above 0, a width too large for the flanks, or
         a stretch that is not on the ridge.
         """
@@ -158,6 +158,7 @@ class Ridge(Stations):
         blend: Array,
     ) -> tuple[Array, Array]:
         """New values and their local rates."""
+        ring = self.closed and old[0] == old[-1]
         if rate is not None and absolute is not None:
             raise ValueError(
                 f"expected either the rate {rate_name} or the absolute {name}, got both; drop one"
@@ -170,17 +171,17 @@ class Ridge(Stations):
                     f"{name}: expected one number or {old.size}, one a station, got shape {values.shape}"
                 )
             goal = np.broadcast_to(values, old.shape)
-            if self.closed and abs(goal[0] - goal[-1]) > 1e-9 * np.abs(goal).max():
+            if ring and abs(goal[0] - goal[-1]) > 1e-9 * np.abs(goal).max():
                 raise ValueError(
-                    f"{name}: expected the same value at both ends of a closed ridge, got {goal[0]:g} at 0 and "
-                    f"{goal[-1]:g} at {self.length:g}; give a function that repeats"
+                    f"{name}: expected the same value at both ends of a closed ridge, got {goal[0]:g} at 0 "
+                    f"and {goal[-1]:g} at {self.length:g}; give a function that repeats"
                 )
         elif rate is not None:
             goal = old * float(_finite(rate, rate_name, ()))
         else:
             return old, np.ones_like(old)
         new = old + blend * (goal - old)
-        if self.closed:
+        if ring:
             new[-1] = new[0]
         return new, np.divide(new, old, out=np.ones_like(old), where=old != 0)
 

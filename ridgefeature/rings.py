@@ -11,7 +11,7 @@ from ridgefeature.ends import trends
 from ridgefeature.improve import improve, loss_of
 from ridgefeature.kernels import appraise
 from ridgefeature.march import FLAT, Track
-from ridgefeature.neighbours import FEWEST, advances, between
+from ridgefeature.neighbours import FEWEST, HOME, TYPICAL, advances, alike, between
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -42,16 +42,30 @@ def ring_or_not(window: Window, track: Track, settings: Settings) -> Track:
 
 
 def closed_chain(window: Window, chain: list[Template], settings: Settings) -> list[Template]:
-    """The chain as a ring, evenly enough: what overlaps at the seam dropped, what lacks there fitted."""
-    templates = list(chain)
+    """The chain as a ring: what overlaps or is odd at the seam dropped, what lacks there fitted."""
+    templates = _without_odd(_without_odd(chain)[::-1])[::-1]
     while len(templates) > FEWEST and not advances(templates[-1], templates[0]):
         del templates[-1]
     first, last = templates[0], templates[-1]
-    apart = float(np.linalg.norm(first.position - last.position))
-    if apart > _WIDE * 0.5 * (first.length + last.length):
-        fitted = improve(window, between(last, first), settings)
-        if _fits(fitted, settings) and advances(last, fitted) and advances(fitted, first):
+    apart = float(np.linalg.norm(first.position - last.position)) / (0.5 * (first.length + last.length))
+    if apart < _WIDE:
+        return templates
+    count = max(round(apart) - 1, 1)
+    for i in range(count):
+        start = between(last, first, (i + 1) / (count + 1))
+        fitted = improve(window, start, settings)
+        if _fits(fitted, settings) and advances(templates[-1], fitted) and advances(fitted, first):
             templates.append(fitted)
+    return templates
+
+
+def _without_odd(templates: list[Template]) -> list[Template]:
+    """The templates without first ones that are unlike those after them: there a march was lost."""
+    for i in range(HOME):
+        if len(templates) - i <= FEWEST:
+            break
+        if alike(templates[i], templates[i + 1 : i + 1 + TYPICAL]):
+            return templates[i:]
     return templates
 
 
@@ -98,13 +112,15 @@ def _base_over_ridge(window: Window, ring: list[Template], settings: Settings) -
     n = len(ring)
     apart = [float(np.linalg.norm(ring[(i + 1) % n].position - t.position)) for i, t in enumerate(ring)]
     step = float(np.median([t.width for t in ring])) / _BINS_PER_WIDTH
-    gains, owners = [], []
+    gains: list[Array] = []
+    owners: list[Places] = []
     for i, template in enumerate(ring):
         low, high = 0.5 * apart[i - 1], 0.5 * apart[i]
         bins = max(round((low + high) / step), 1)
         gains.append(_gain(window, template, low, high, bins, settings))
         owners.append(np.full(bins, i, dtype=np.intp))
-    return np.concatenate(gains), np.concatenate(owners), step
+    owner: Places = np.concatenate(owners)
+    return np.concatenate(gains), owner, step
 
 
 def _gain(
@@ -125,7 +141,7 @@ def _gain(
         for h in (height, 0.0)
     )
     place = np.clip(((points[:, 0] + low) / (low + high) * bins).astype(np.intp), 0, bins - 1)
-    return np.bincount(place, weights=ridge - base, minlength=bins)
+    return np.asarray(np.bincount(place, weights=ridge - base, minlength=bins), dtype=np.float64)
 
 
 def _largest_run(gain: Array) -> tuple[int, int, float]:
