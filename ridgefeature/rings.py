@@ -145,14 +145,10 @@ def _gain(
 
 
 def _largest_run(gain: Array) -> tuple[int, int, float]:
-    """Start, end and sum of the run of bins with the largest sum, on a circle of bins."""
+    """Start, end and sum of the run of bins (n,) with the largest sum, on a circle of bins; 0, 0, 0 for none."""
     n = len(gain)
-    best, low, high = 0.0, 0, 0
-    total, start = 0.0, 0
-    for i, value in enumerate(np.concatenate([gain, gain]).tolist()):
-        if total <= 0.0 or i - start >= n:
-            total, start = 0.0, i
-        total += value
-        if total > best:
-            best, low, high = total, start, i + 1
-    return low, high, best
+    sums = np.concatenate([[0.0], np.cumsum(np.concatenate([gain, gain]))])
+    start, length = np.arange(n)[:, None], np.arange(n + 1)
+    runs = sums[start + length] - sums[start]
+    low, longest = divmod(int(np.argmax(runs)), n + 1)
+    return (low, low + longest, float(runs[low, longest])) if longest else (0, 0, 0.0)
