@@ -145,7 +145,7 @@ def _gain(
 
 
 def _largest_run(gain: Array) -> tuple[int, int, float]:
-    """Start, end and sum of the run of bins (n,) with the largest sum, on a circle of bins; 0, 0, 0 for none."""
+    """Start, end and sum of the run of bins (n,) with the largest sum, on a circle; 0, 0, 0 for none."""
     n = len(gain)
     sums = np.concatenate([[0.0], np.cumsum(np.concatenate([gain, gain]))])
     start, length = np.arange(n)[:, None], np.arange(n + 1)
