@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
 from ridgefeature.kernels import chain as kernel
-from ridgefeature.neighbours import comes_home
+from ridgefeature.neighbours import LEAST_ADVANCE, comes_home
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -96,6 +96,8 @@ def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = F
     if not 0.55 < fitted.width / start.width < 1.8:
         return "no ridge: the width jumped"
     local = start.rotation.T @ (fitted.position - start.position)
+    if local[0] < (LEAST_ADVANCE - 1.0) * start.length:
+        return "no ridge: it turned back"
     if abs(local[1]) > 0.5 * start.width or abs(local[2]) > 0.5 * start.width + abs(start.height):
         return "no ridge: the spine jumped"
     if fitted.rotation[:, 0] @ start.rotation[:, 0] < np.cos(_LARGEST_TURN):

@@ -90,8 +90,8 @@ def mend(
 
 
 def _levelled(window: Window, templates: list[Template], closed: bool, settings: Settings) -> list[Template]:
-    """The templates, those whose base tips over refitted on that of their neighbours where that agrees."""
-    templates, n = list(templates), len(templates)
+    """The templates, those whose base tips over refitted on that of their neighbours where it fits better."""
+    n = len(templates)
     for i, template in enumerate(templates):
         near = _near(templates, i, closed)
         if len(near) == 1 and n > 2:
@@ -104,9 +104,11 @@ def _levelled(window: Window, templates: list[Template], closed: bool, settings:
             step = float(near[0].rotation[:, 0] @ (template.apex - near[0].apex))
             start = near[0].changed(trend=near[0].trend * np.array([1.0, 0.0, 0.0])).slid(step)
         new = _fitted(window, start.changed(length=template.length), settings)
-        chain = [*templates[:i], new, *templates[i + 1 :]] if new is not None else []
-        if new is not None and not tipped(new, near) and follows(chain, i, closed):
-            templates[i] = new
+        if new is None or new.evidence < template.evidence or tipped(new, near):
+            continue
+        chain = [*templates[:i], new, *templates[i + 1 :]]
+        if follows(chain, i, closed):
+            templates = chain
     return templates
 
 
