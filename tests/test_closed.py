@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_paths import Scene, circle, ellipse, inward_spiral, rounded_rectangle, u_turn
+from scipy.spatial.transform import Rotation
 
 import ridgefeature as rf
 from ridgefeature.base import registered_base
@@ -174,6 +175,20 @@ def test_a_ring_in_other_order_of_points_is_the_same_to_the_last_bit(scene, ring
     again = rf.register(np.random.default_rng(0).permutation(points), at=ring.pick)
     for name in ("spine", "height", "width", "height_std"):
         np.testing.assert_array_equal(getattr(again, name), getattr(ring, name))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 40.0])
+def test_a_ring_moves_turns_and_grows_with_its_scan(scene, ring, scale):
+    turn, shift = Rotation.from_rotvec([0.4, -1.1, 0.6]).as_matrix(), np.array([300.0, -20.0, 7.0])
+
+    def move(points):
+        return scale * (points @ turn.T + shift)
+
+    found = rf.register(move(scan(scene, 0.1, 2)), at=move(ring.pick))
+    assert found.closed
+    np.testing.assert_allclose(found.spine, move(ring.spine), atol=1e-6 * scale * W)
+    np.testing.assert_allclose(found.height, scale * ring.height, rtol=1e-6)
+    np.testing.assert_allclose(found.width, scale * ring.width, rtol=1e-6)
 
 
 def test_templates_advance_round_the_ring(ring):
