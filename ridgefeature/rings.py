@@ -35,7 +35,7 @@ def ring_or_not(window: Window, track: Track, settings: Settings) -> Track:
     if not track.closed:
         return track
     templates = closed_chain(window, list(track.templates), settings.marching())
-    chain = opened(window, templates, settings) if len(templates) >= FEWEST else list(track.templates)
+    chain = opened(window, templates, settings)
     if chain is None:
         return replace(track, templates=tuple(templates), stop=(CLOSED, CLOSED))
     return replace(track, templates=tuple(chain), stop=(FLAT, FLAT), closed=False)
@@ -74,7 +74,7 @@ def _fits(template: Template, settings: Settings) -> bool:
 
 
 def opened(window: Window, ring: list[Template], settings: Settings) -> list[Template] | None:
-    """The templates of a ring from behind its longest gap to before it; None where there is no gap.
+    """The templates of a ring from behind its clearest gap to before it; None where there is no gap.
 
     A gap is a stretch of half a width or more where the points agree with the base beyond doubt, not one
     without points.
@@ -94,7 +94,7 @@ def opened(window: Window, ring: list[Template], settings: Settings) -> list[Tem
     order = sorted((int(i) for i in kept), key=lambda i: (i - start) % len(ring))
     if order[0] == start and share[start] > 0 and _mostly_before(owner, inside, start):
         order = [*order[1:], order[0]]
-    return [ring[i] for i in order]
+    return _without_odd(_without_odd([ring[i] for i in order])[::-1])[::-1]
 
 
 def _mostly_before(owner: Places, inside: Places, i: int) -> bool:

@@ -13,6 +13,7 @@ import ridgefeature as rf
 from ridgefeature.base import registered_base
 from ridgefeature.basis import basis_matrix, periodic_interpolation
 from ridgefeature.commands.output import rows
+from ridgefeature.fitting import joined
 from ridgefeature.neighbours import advances
 from ridgefeature.rings import _largest_run
 
@@ -286,6 +287,36 @@ def test_a_stretched_ring_is_closed_and_a_trimmed_one_is_not(ring):
     assert longer.closed and longer.surface().closed == (True, False)
     short = ring.stretched(0.7 * ring.length, fit="trim")
     assert not short.closed and short.surface().closed == (False, False)
+
+
+def test_a_ring_pasted_on_a_plane_is_a_ring(ring):
+    import cadquery as cq
+
+    from cad_export.face_base import face_base
+
+    box = cq.Workplane().box(200, 200, 10)
+    base, fitted = face_base(box.faces(">Z").val(), ring)
+    assert base.closed and fitted is ring
+    assert ring.surface(base).closed == (True, False)
+    eta = np.linspace(-0.5, 0.5, 2001)
+    area = np.trapezoid(ring.section(eta), eta) * ring.height * ring.width
+    part = box.faces(">Z").pasteRidge(ring).val()
+    assert part.isValid() and len(part.Faces()) == 8
+    assert part.Volume(1e-5) - 4e5 == pytest.approx(np.trapezoid(area, ring.arc_length), rel=1e-3)
+
+
+def test_a_ring_is_refused_on_a_face_where_its_path_does_not_close(ring):
+    import cadquery as cq
+
+    from cad_export.face_base import face_base
+
+    ball = cq.Workplane().sphere(150).faces().val()
+    with pytest.raises(ValueError, match="keeps clear of itself"):
+        face_base(ball, ring, at=(150, 0, 0), direction=(0, 1, 0))
+
+
+def test_a_ring_needs_no_blending_to_be_joined(ring):
+    assert joined(ring) is ring
 
 
 def test_it_says_closed_instead_of_why_its_ends_stopped(ring):
