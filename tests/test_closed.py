@@ -110,7 +110,9 @@ def test_a_ring_of_radius_one_and_a_half_widths_is_closed_more_often_than_not():
 @pytest.mark.parametrize("name", OPEN)
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_open_stays_open(name, seed):
-    found = registered(OPEN[name], NOISE[seed % 3], seed)
+    # not in the turn itself: its radius is 0.6 w
+    u = float(np.random.default_rng(seed).uniform(0.03, 0.4))
+    found = registered(OPEN[name], NOISE[seed % 3], seed, u)
     assert not found.closed
     assert "closed" not in found.stop
 
