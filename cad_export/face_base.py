@@ -15,6 +15,7 @@ from cad_export.face_path import FacePath, developed_path, follow, nearest, proj
 from cad_export.flanks import narrowed
 from cad_export.geometry import topods
 from cad_export.host_surface import Host, host_of
+from cad_export.ring_path import closed_path
 from cad_export.strip import check_strip, inner_point, longer_direction, samples_of
 from ridgefeature.base import developed
 from ridgefeature.fitting import joined, mirrored
@@ -160,7 +161,7 @@ def face_base(
     path: an edge or wire within NEAR widths of the face, in the direction of its orientation; fit, as in
     Ridge.stretched: "length" stretches the ridge to the path, "scale" scales it too, "trim" keeps it, cut
     where the path is shorter; a longer path is used up to the ridge's length. A closed path gives a closed
-    base, on which the ridge's ends are blended into each other.
+    base, on which the ridge's ends are blended into each other; so does a ring that closes on the face.
     w: rate of width that the ridge will have at most; given, its flanks are narrowed where path or face would
     fold them, but not the feet's own (see flanks.narrowed).
     mirror: what lay to the left of the ridge's path lies to its right. reverse: the ridge runs the other way.
@@ -196,6 +197,7 @@ def laid(
     if path is None:
         place = _place(host, at, near)
         curve = developed_path(host, fitted, place, _tangent(host, fitted, place, direction, reverse))
+        curve = closed_path(host, curve, float(np.median(ridge.width))) if fitted.closed else curve
     elif at is not None or direction is not None:
         raise ValueError("expected either a path, or at and direction, got both; drop one")
     else:

@@ -62,7 +62,10 @@ class RuledBase:
 
 def registered_base(stations: Stations) -> RuledBase:
     """The base that a ridge was registered on."""
-    return RuledBase(stations.arc_length, stations.spine, stations.tangent, stations.normal)
+    closed = bool(getattr(stations, "closed", False)) and np.array_equal(
+        stations.spine[0], stations.spine[-1]
+    )
+    return RuledBase(stations.arc_length, stations.spine, stations.tangent, stations.normal, closed)
 
 
 def geodesic_curvature(stations: Stations, at: Array | None = None) -> Array:

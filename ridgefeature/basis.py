@@ -143,3 +143,16 @@ def _check_degree(degree: int) -> None:
 def _brief(a: Floats) -> str:
     text = np.array2string(a, threshold=8, edgeitems=3, precision=4)
     return f"{' '.join(text.split())} of shape {a.shape}"
+
+
+def periodic_interpolation(sites: Floats) -> tuple[Floats, Floats]:
+    """The cubic spline through values at sites (n,) ascending, n >= 4, the last of which is the first again.
+
+    Its knots, and the linear map (n + 2, n) from values to poles: C2 over the seam, as everywhere.
+    """
+    knots = np.concatenate([np.full(4, sites[0]), sites[1:-1], np.full(4, sites[-1])])
+    ends = [basis_matrix(knots, 3, sites[[0, -1]], order) for order in (1, 2)]
+    # divided by their size, derivatives condition the matrix no worse than values do
+    seam = [(e[0] - e[1]) / np.abs(e).max() for e in ends]
+    matrix = np.vstack([basis_matrix(knots, 3, sites), *seam])
+    return knots, np.asarray(np.linalg.inv(matrix)[:, : len(sites)], dtype=np.float64)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import statistics
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, loss_of
 from ridgefeature.kernels import chain
-from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.march import GOES_ON, Track, reverse
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -23,8 +23,13 @@ _BEYOND_CHANCE = 2.0
 """Evidence, in parts of what is needed to go on, above which a template lies on the ridge beyond doubt."""
 
 
-def trends(templates: list[Template]) -> list[Template]:
-    """Each template with the path's curvature and the slopes of height and width that its neighbours show."""
+def trends(templates: list[Template], closed: bool = False) -> list[Template]:
+    """Each template with the path's curvature and the slopes of height and width that its neighbours show.
+
+    closed: the first follows the last.
+    """
+    if closed:
+        return trends([templates[-1], *templates, templates[0]])[1:-1]
     rows = chain.trends(
         np.array([t.position for t in templates]),
         np.array([t.rotation for t in templates]),
@@ -119,25 +124,20 @@ def _extrapolated(places: Array, values: list[float]) -> tuple[float, float]:
 
 def _relength(template: Template, low: float, high: float) -> Template:
     """The patch from x = low to x = high of the template's own frame, on its bent path."""
-    middle = 0.5 * (low + high)
-    bend = template.trend[0]
-    turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
-    shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
-    return template.changed(
-        position=template.position + template.rotation @ shift,
-        rotation=template.rotation @ turn,
-        length=float(high - low),
-        height=float(template.height + template.trend[1] * middle),
-        width=float(max(template.width + template.trend[2] * middle, 0.5 * template.width)),
-    )
+    return template.slid(0.5 * (low + high)).changed(length=float(high - low))
 
 
 def place_ends(window: Window, track: Track, settings: Settings) -> Track:
-    """The track with its end templates cut to where the ridge ends, unless it goes on beyond the march."""
+    """The track with its end templates cut to where the ridge ends, unless it goes on beyond the march.
+
+    A ring has no ends.
+    """
+    if track.closed:
+        return track
     templates = list(track.templates)
     if not track.stop[1].startswith(GOES_ON):
         templates = _trim_end(window, templates, settings)
     if not track.stop[0].startswith(GOES_ON):
         backwards = _trim_end(window, [reverse(t) for t in reversed(templates)], settings)
         templates = [reverse(t) for t in reversed(backwards)]
-    return Track(tuple(templates), track.stop)
+    return replace(track, templates=tuple(templates))

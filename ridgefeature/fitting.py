@@ -84,15 +84,19 @@ def mirrored(ridge: Ridge) -> Ridge:
 def joined(ridge: Ridge) -> Ridge:
     """The ridge with height, width and border blended at both ends to their mean there, for a closed base.
 
-    The blend takes one width at each end, or a third of the ridge where that is less.
+    The blend takes one width at each end, or a third of the ridge where that is less. A ring's values meet
+    as they are.
     """
+    names = ("height", "width", "border")
+    if ridge.closed and all(getattr(ridge, name)[0] == getattr(ridge, name)[-1] for name in names):
+        return ridge
     reach = min(float(max(ridge.width[0], ridge.width[-1])), ridge.length / 3)
     reach = max(reach, 1.5 * float(ridge.arc_length[1]))
     near = 1 - np.minimum(ridge.arc_length, ridge.length - ridge.arc_length) / reach
     x = np.clip(near, 0.0, 1.0)
     share = x**3 * (10 - 15 * x + 6 * x * x)
     changes: dict[str, Any] = {}
-    for name in ("height", "width", "border"):
+    for name in names:
         old = getattr(ridge, name)
         new = old + share * (0.5 * (old[0] + old[-1]) - old)
         new[-1] = new[0]

@@ -39,6 +39,9 @@ _LOSS = {
 _HUBER = (residual.HUBER, 1.345)
 _ROUGH = 1e-2
 _AGREE = 0.1
+_SLIDES = 0.15
+"""Share of its length by which a fit may leave its start's place along the ridge."""
+_MOST_SLIDES = 3
 _FEW_OUTLIERS = 0.02
 
 
@@ -207,10 +210,22 @@ def improve(window: Window, start: Template, settings: Settings) -> Template:
 
 
 def refine(window: Window, start: Template, limits: Limits, settings: Settings) -> Template:
-    """Fit one template to the last digit, from a start near the optimum; never raises for not converging."""
+    """Fit one template to the last digit, from a start near the optimum; never raises for not converging.
+
+    It stays at its place along the ridge. A fit does not move along its start's own axis, but where the start
+    is tipped over, up and down is along the ridge too: then it is slid back and fitted again.
+    """
     if settings.measure == "M":
         return _by_distance(window, start, limits, settings)
-    return _rounds(window, start, limits, settings.tolerance, 0.02, 0, settings)
+    fitted = _rounds(window, start, limits, settings.tolerance, 0.02, 0, settings)
+    for _ in range(_MOST_SLIDES):
+        # The crest tells the place: the start's base may have been anywhere.
+        slide = float(fitted.rotation[:, 0] @ (start.apex - fitted.apex))
+        if fitted.status == "no data" or abs(slide) < _SLIDES * start.length:
+            break
+        again = fitted.slid(slide)
+        fitted = _rounds(window, again, limits, settings.tolerance, 0.02, fitted.evaluations, settings)
+    return fitted
 
 
 def _by_distance(window: Window, template: Template, limits: Limits, settings: Settings) -> Template:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
 from ridgefeature.kernels import chain as kernel
+from ridgefeature.neighbours import LEAST_ADVANCE, comes_home
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -21,9 +22,10 @@ Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
 _RAN_BACK = "it ran back into itself"
-GOES_ON = (INTERRUPTED, _RAN_BACK, "max_templates")
+CAME_HOME = "it came back to where it began"
+GOES_ON = (INTERRUPTED, _RAN_BACK, CAME_HOME, "max_templates")
 """How the reasons of a march begin that stopped though the ridge goes on."""
-_FLAT = "no ridge: the data agree with a flat base"
+FLAT = "no ridge: the data agree with a flat base"
 _WEAK = 5.0
 """Evidence in parts of what is needed to go on, below which a ridge hardly stands out."""
 _ALIKE = math.cos(math.radians(8.0))
@@ -51,6 +53,8 @@ class Track:
     stop: tuple[str, str]
     misfit: Array | None = None
     """(2, m) number and sum of residuals by distance from the spine, once the track is settled."""
+    closed: bool = False
+    """Whether the first template follows the last: a ring."""
 
 
 def reverse(template: Template) -> Template:
@@ -92,7 +96,7 @@ def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = F
     if fitted.points < FEWEST_POINTS or fitted.status == "no data":
         return "the data end here"
     if fitted.evidence < settings.going_on:
-        return _FLAT
+        return FLAT
     if fitted.height * start.height <= 0 or abs(fitted.height) > 2.5 * abs(start.height):
         return "no ridge: the height jumped"
     if gap and (fitted.evidence < settings.evidence or not 0.5 < fitted.height / start.height < 2.0):
@@ -100,6 +104,8 @@ def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = F
     if not 0.55 < fitted.width / start.width < 1.8:
         return "no ridge: the width jumped"
     local = start.rotation.T @ (fitted.position - start.position)
+    if local[0] < (LEAST_ADVANCE - 1.0) * start.length:
+        return "no ridge: it turned back"
     if abs(local[1]) > 0.5 * start.width or abs(local[2]) > 0.5 * start.width + abs(start.height):
         return "no ridge: the spine jumped"
     if fitted.rotation[:, 0] @ start.rotation[:, 0] < np.cos(_LARGEST_TURN):
@@ -115,10 +121,10 @@ def _outgrown(fitted: Template, chain: list[Template]) -> str:
     return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
 
 
-def _meets(template: Template, others: list[Template]) -> bool:
-    """Whether a template lies on one of the others."""
+def _met(template: Template, others: list[Template]) -> int:
+    """Which of the others a template lies on, the first of them; -1 for none."""
     if not others:
-        return False
+        return -1
     apart = np.array([other.position for other in others]) - template.position
     for i in np.flatnonzero((apart * apart).sum(axis=1) < (2 * (template.length + template.width)) ** 2):
         other = others[i]
@@ -128,8 +134,8 @@ def _meets(template: Template, others: list[Template]) -> bool:
             and abs(local[1]) < 0.5 * other.width
             and abs(local[2]) < other.width
         ):
-            return True
-    return False
+            return int(i)
+    return -1
 
 
 def _fit_next(
@@ -144,7 +150,7 @@ def _fit_next(
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
         return _round_corner(rough, chain, settings) or found
-    if not found[2].startswith(_FLAT):
+    if not found[2].startswith(FLAT):
         return found
     for known in (chain, _without_last(chain, settings)):
         longer = _fit_best(rough, full, known, append(known, settings, longest=True), gap, settings)
@@ -185,7 +191,7 @@ def _round_corner(
             clear
             and alike
             and not _reject(fitted, start, settings, gap=True)
-            and not _meets(fitted, chain[:-1])
+            and _met(fitted, chain[:-1]) < 0
         ):
             return start, fitted, ""
     return None
@@ -253,8 +259,10 @@ def march_one_way(
                 return reason
             chain.append(start)
             continue
-        if _meets(fitted, [*known, *found][:-2]):
-            return reason or _RAN_BACK
+        whole = [*known, *found]
+        met = _met(fitted, whole[:-2])
+        if met >= 0:
+            return CAME_HOME if comes_home(fitted, whole, met) else reason or _RAN_BACK
         reason, skipped = "", 0.0
         found.append(fitted)
         chain.append(fitted)
@@ -275,8 +283,10 @@ def march(
         if progress is not None:
             progress(first)
         why_ahead = march_one_way(rough, full, [first], ahead, settings, progress)
-        known = [reverse(t) for t in [*reversed(ahead), first]]
-        why_back = march_one_way(rough, full, known, back, settings, progress)
+        if why_ahead != CAME_HOME:
+            known = [reverse(t) for t in [*reversed(ahead), first]]
+            why_back = march_one_way(rough, full, known, back, settings, progress)
     except KeyboardInterrupt:
         pass
-    return Track((*(reverse(t) for t in reversed(back)), first, *ahead), (why_back, why_ahead))
+    templates = (*(reverse(t) for t in reversed(back)), first, *ahead)
+    return Track(templates, (why_back, why_ahead), closed=CAME_HOME in (why_ahead, why_back))

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.basis import basis_matrix, greville
+from ridgefeature.basis import basis_matrix, greville, periodic_interpolation
 from ridgefeature.bspline import Surface
 from ridgefeature.section import Section
 from ridgefeature.template import Template
@@ -46,13 +46,11 @@ def interpolation(k: int, closed: bool = False) -> tuple[Array, Array]:
     Not-a-knot, k poles; closed: C2 from the last site, which is the first again, to the first, k + 2 poles.
     """
     sites = np.linspace(0.0, 1.0, k)
-    knots = np.concatenate([np.zeros(4), sites[1:-1] if closed else sites[2:-2], np.ones(4)])
-    matrix = basis_matrix(knots, DEGREE, sites)
     if closed:
-        ends = [basis_matrix(knots, DEGREE, np.array([0.0, 1.0]), d) for d in (1, 2)]
-        # divided by their size, derivatives condition the matrix no worse than values do
-        matrix = np.vstack([matrix, *((e[0] - e[1]) / np.abs(e).max() for e in ends)])
-    inverse = np.asarray(np.linalg.inv(matrix)[:, :k], dtype=np.float64)
+        knots, inverse = periodic_interpolation(sites)
+    else:
+        knots = np.concatenate([np.zeros(4), sites[2:-2], np.ones(4)])
+        inverse = np.asarray(np.linalg.inv(basis_matrix(knots, DEGREE, sites)), dtype=np.float64)
     knots.setflags(write=False)
     inverse.setflags(write=False)
     return knots, inverse
@@ -85,17 +83,21 @@ def merged_surface(
     width: Array,
     border: Array,
     section: Section,
+    closed: bool = False,
 ) -> Surface:
     """The surface through one row of control points at each of k even stations.
 
     spine, across, normal (k, 3): origin and unit axes of each row; height, width, border (k,). The poles are
     affine in height and in width, so what does not change with them is not worked out again. u is arc length,
     v the distance from the spine in widths (on the ridge; on the flanks it runs on to the border).
+    closed: the last station is the first again, and the surface C2 over that seam too.
     """
-    knots, inverse = interpolation(len(arc_length))
+    knots, inverse = interpolation(len(arc_length), closed)
     sideways, raised = row_controls(section, width, border, height)
     rows = spine[:, None] + sideways[..., None] * across[:, None] + raised[..., None] * normal[:, None]
     poles = np.tensordot(inverse, rows, 1)
+    if closed:
+        poles[-1] = poles[0]
     return Surface(poles, knots * arc_length[-1], section_knots(section), DEGREE, DEGREE)
 
 

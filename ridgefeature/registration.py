@@ -16,6 +16,7 @@ from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
 from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
+from ridgefeature.rings import ring_or_not
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle
@@ -73,10 +74,11 @@ def register(
     )
     templates = _with_distances(track.templates, grid)
     return Ridge(
-        **vars(lay_out(templates, settings)),
+        **vars(lay_out(templates, settings, track.closed)),
         section=templates[0].section,
         templates=templates,
         stop=track.stop,
+        closed=track.closed,
         unit=scan.unit,
         pick=pick,
         settings=settings,
@@ -103,7 +105,7 @@ def _track(
             "height= as a start"
         )
     first = _canonical(full, first, pick, hints)
-    track = march(rough, full, first, settings, progress)
+    track = ring_or_not(full, march(rough, full, first, settings, progress), settings)
     track = place_ends(full, track, settings)
     track = finish_ends(full, settle(full, track, settings), settings)
     why = no_ridge(rough, track, pick, extent, settings)
@@ -122,7 +124,7 @@ def _track(
         return track
     templates = tuple(with_section(t, section) for t in track.templates)
     # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
-    track = settle(full, settle(full, Track(templates, track.stop), settings), settings)
+    track = settle(full, settle(full, replace(track, templates=templates), settings), settings)
     return finish_ends(full, track, settings)
 
 
@@ -143,12 +145,15 @@ def _directed(track: Track, pick: Array, hints: Hints) -> Track:
     first, last = track.templates[0], track.templates[-1]
     nearest = min(track.templates, key=lambda t: float(np.linalg.norm(t.position - pick)))
     if hints.direction is not None:
-        backwards = nearest.rotation[:, 0] @ hints.direction < 0
+        backwards = bool(nearest.rotation[:, 0] @ hints.direction < 0)
+    elif track.closed:
+        backwards = False
     else:
-        backwards = np.linalg.norm(last.end - pick) < np.linalg.norm(first.start - pick)
+        backwards = bool(np.linalg.norm(last.end - pick) < np.linalg.norm(first.start - pick))
     if not backwards:
         return track
-    return Track(tuple(reverse(t) for t in reversed(track.templates)), (track.stop[1], track.stop[0]))
+    turned = tuple(reverse(t) for t in reversed(track.templates))
+    return replace(track, templates=turned, stop=(track.stop[1], track.stop[0]))
 
 
 def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Template, ...]:

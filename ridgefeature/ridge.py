@@ -32,7 +32,8 @@ class Ridge(Stations):
     Lengths in the unit of the scan, coordinates in its frame, k stations evenly spaced in arc length.
     `height` is the apex over the base; `width` the distance between the feet, where the section meets the
     base; `half_height_width` the full width at half height. The `_std` are one standard deviation. `closed`
-    tells whether the ridge is a ring; `stop` why each end stopped, in words.
+    tells whether the ridge is a ring, whose last station is the first again; `stop` why each end stopped, in
+    words, of a ring "closed".
     """
 
     section: Section
@@ -67,6 +68,12 @@ class Ridge(Stations):
         """Arc length of the whole ridge."""
         return float(self.arc_length[-1])
 
+    @property
+    def _meets_itself(self) -> bool:
+        """Whether the last station is the first again: a ring where it was registered, not only on a base."""
+        names = ("spine", "tangent", "normal", "height", "width", "border")
+        return self.closed and all(np.array_equal(x[0], x[-1]) for x in (getattr(self, n) for n in names))
+
     @cached_property
     def _surface(self) -> Surface:
         return merged_surface(
@@ -78,6 +85,7 @@ class Ridge(Stations):
             self.width,
             self.border,
             self.section,
+            self._meets_itself,
         )
 
     def surface(self, base: Base | None = None) -> Surface:
@@ -112,10 +120,11 @@ class Ridge(Stations):
 
         h, w: rates, 1 = as it is; a negative h makes a groove. height, width: absolute, a number or a
         function of arc length (k,) -> (k,). between: arc lengths (s0, s1) of the stretch that changes,
-        blended smoothly inside it over a third of the stretch or one width, whichever is less. Standard
-        deviations follow; that of a height made 0 is 0. Raises ValueError for both a rate and an absolute
-        value, values that are not finite, w or width not above 0, a width too large for the flanks, or a
-        stretch that is not on the ridge.
+        blended smoothly inside it over a third of the stretch or one width, whichever is less; on a ring s1
+        may lie beyond the length, then the stretch runs over the seam. Standard deviations follow; that of a
+        height made 0 is 0. Raises ValueError for both a rate and an absolute value, values that are not
+        finite or of a ring differ at both ends, w or width not above 0, a width too large for the flanks, or
+        a stretch that is not on the ridge.
         """
         blend = self._blend(between)
         new_height, height_rate = self._changed("height", "h", self.height, h, height, blend)
@@ -149,6 +158,7 @@ class Ridge(Stations):
         blend: Array,
     ) -> tuple[Array, Array]:
         """New values and their local rates."""
+        ring = self.closed and old[0] == old[-1]
         if rate is not None and absolute is not None:
             raise ValueError(
                 f"expected either the rate {rate_name} or the absolute {name}, got both; drop one"
@@ -161,23 +171,37 @@ class Ridge(Stations):
                     f"{name}: expected one number or {old.size}, one a station, got shape {values.shape}"
                 )
             goal = np.broadcast_to(values, old.shape)
+            if ring and abs(goal[0] - goal[-1]) > 1e-9 * np.abs(goal).max():
+                raise ValueError(
+                    f"{name}: expected the same value at both ends of a closed ridge, got {goal[0]:g} at 0 "
+                    f"and {goal[-1]:g} at {self.length:g}; give a function that repeats"
+                )
         elif rate is not None:
             goal = old * float(_finite(rate, rate_name, ()))
         else:
             return old, np.ones_like(old)
         new = old + blend * (goal - old)
+        if ring:
+            new[-1] = new[0]
         return new, np.divide(new, old, out=np.ones_like(old), where=old != 0)
 
     def _blend(self, between: tuple[float, float] | None) -> Array:
         if between is None:
             return np.ones_like(self.arc_length)
         low, high = (float(x) for x in _finite(between, "between", (2,)))
-        if not 0 <= low < high <= self.length * (1 + 1e-12):
+        longest = self.length * (1 + 1e-12)
+        if not (0 <= low < high and (high - low if self.closed else high) <= longest and low <= longest):
+            limit = "s1 <= s0 + " if self.closed else "s1 <= "
             raise ValueError(
-                f"between: expected 0 <= s0 < s1 <= {self.length:g}, the ridge's arc length, "
+                f"between: expected 0 <= s0 < {limit}{self.length:g}, the ridge's arc length, "
                 f"got ({low:g}, {high:g})"
             )
-        inside = (self.arc_length > low) & (self.arc_length < high)
+        at = self.arc_length
+        if self.closed:
+            if high - low >= self.length:
+                return np.ones_like(at)
+            at = low + (at - low) % self.length
+        inside = (at > low) & (at < high)
         if inside.sum() < 3:
             step = float(self.arc_length[1])
             raise ValueError(
@@ -186,9 +210,9 @@ class Ridge(Stations):
             )
         ramp = min((high - low) / 3, float(np.median(self.width)))
         # An end of the ridge needs no ramp: there is nothing beyond it to blend with.
-        rise = 1.0 if low <= 0 else np.clip((self.arc_length - low) / ramp, 0, 1)
-        fall = 1.0 if high >= self.length else np.clip((high - self.arc_length) / ramp, 0, 1)
-        x = np.minimum(rise, fall) * np.ones_like(self.arc_length)
+        rise = 1.0 if low <= 0 and not self.closed else np.clip((at - low) / ramp, 0, 1)
+        fall = 1.0 if high >= self.length and not self.closed else np.clip((high - at) / ramp, 0, 1)
+        x = np.minimum(rise, fall) * np.ones_like(at)
         return x**3 * (10 - 15 * x + 6 * x * x)
 
     def section_at(self, s: float, n: int = 101, h: float = 1.0, w: float = 1.0) -> Array:
@@ -207,7 +231,8 @@ class Ridge(Stations):
         at = np.array([min(float(s), self.length)])
         points = surface(at, v)
         origin, tangent, normal = (
-            along(self.arc_length, x, at)[0] for x in (self.spine, self.tangent, self.normal)
+            along(self.arc_length, x, at, closed=self._meets_itself)[0]
+            for x in (self.spine, self.tangent, self.normal)
         )
         left = np.cross(normal, tangent)
         left /= np.linalg.norm(left)

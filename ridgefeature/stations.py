@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.basis import basis_matrix
+from ridgefeature.basis import basis_matrix, periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
 from ridgefeature.settings import Settings
@@ -70,13 +70,69 @@ def _on_path(template: Template, x: float) -> Array:
     return template.position + template.rotation @ np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
 
 
-def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
-    """Stations of a chain of fitted templates.
+def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = False) -> Stations:
+    """Stations of a chain of fitted templates; closed: the last station is the first again.
 
     The spine is a C2 spline through the templates' centres and outer ends; height and width are natural cubic
     splines through the templates' values in arc length, so the standard deviations follow by the same linear
-    map.
+    map. On a ring, which begins at the first template's centre, all splines are periodic.
     """
+    way = _ring(templates) if closed else _open_path(templates)
+    k = int(np.clip(_PER_TEMPLATE * len(templates) + 1, 13, _MOST))
+    s = np.linspace(0.0, way.total, k)
+    t = np.interp(s, way.lengths, way.fine)
+    tangent = _unit(way.path(t, 1))
+    normal = way.spread_ends(s) @ np.array([q.rotation[:, 2] for q in templates])
+    normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    found = Stations(
+        arc_length=s,
+        spine=way.path(t),
+        tangent=tangent,
+        normal=normal,
+        **_sizes(templates, way.spread(s), way.curvature(s), settings),
+    )
+    return _meeting(found) if closed else found
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """The spine of a chain of templates as a curve, and how values at their centres spread along it."""
+
+    path: Curve
+    fine: Array
+    lengths: Array
+    """Arc length up to the curve's parameters `fine`."""
+    at: Array
+    """Arc length of the templates' centres; of a ring that of the first again, too."""
+    bends: Array
+    """Curvatures there."""
+    closed: bool
+
+    @property
+    def total(self) -> float:
+        return float(self.lengths[-1])
+
+    def spread(self, s: Array) -> Array:
+        """(k, n) from values at the n templates to values at arc lengths s (k,)."""
+        if not self.closed:
+            return natural_spline_matrix(self.at, s)
+        knots, inverse = periodic_interpolation(self.at)
+        return _folded(basis_matrix(knots, 3, s) @ inverse)
+
+    def spread_ends(self, s: Array) -> Array:
+        """The same for what stays as it is from the outermost centres to the ends."""
+        if self.closed:
+            return self.spread(s)
+        matrix = natural_spline_matrix(np.concatenate([[0.0], self.at, [self.total]]), s)
+        matrix[:, 1] += matrix[:, 0]
+        matrix[:, -2] += matrix[:, -1]
+        return matrix[:, 1:-1]
+
+    def curvature(self, s: Array) -> Array:
+        return np.interp(s, self.at, self.bends)
+
+
+def _open_path(templates: tuple[Template, ...]) -> _Path:
     first, last = templates[0], templates[-1]
     sites = np.array(
         [
@@ -85,28 +141,52 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
             _on_path(last, 0.5 * last.length),
         ]
     )
-    chords = np.linalg.norm(np.diff(sites, axis=0), axis=1)
-    parameters = np.concatenate([[0.0], np.cumsum(chords)])
+    parameters = _chord_lengths(sites)
     path = interpolating_curve(parameters, sites)
-    k = int(np.clip(_PER_TEMPLATE * len(templates) + 1, 13, _MOST))
     fine, lengths = _arc_lengths(path, parameters)
-    total = float(lengths[-1])
-    s = np.linspace(0.0, total, k)
-    t = np.interp(s, lengths, fine)
     at = np.interp(parameters[1:-1], fine, lengths)
-    tangent = _unit(path(t, 1))
-    ends = np.concatenate([[0.0], at, [total]])
-    up = np.array([first.rotation[:, 2], *(q.rotation[:, 2] for q in templates), last.rotation[:, 2]])
-    normal = natural_spline_matrix(ends, s) @ up
-    normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
-    return Stations(
-        arc_length=s, spine=path(t), tangent=tangent, normal=normal, **_sizes(templates, at, s, settings)
-    )
+    return _Path(path, fine, lengths, at, np.array([abs(t.trend[0]) for t in templates]), False)
 
 
-def _sizes(templates: tuple[Template, ...], at: Array, s: Array, settings: Settings) -> dict[str, Array]:
-    """Height, width, their deviations, and border at arc lengths s of templates whose centres are at `at`."""
-    spread = natural_spline_matrix(at, s)
+def _ring(templates: tuple[Template, ...]) -> _Path:
+    round_again = (*templates, templates[0])
+    sites = np.array([t.position for t in round_again])
+    parameters = _chord_lengths(sites)
+    knots, inverse = periodic_interpolation(parameters)
+    path = Curve(inverse @ sites, knots, 3)
+    fine, lengths = _arc_lengths(path, parameters)
+    at = np.interp(parameters, fine, lengths)
+    return _Path(path, fine, lengths, at, np.array([abs(t.trend[0]) for t in round_again]), True)
+
+
+def _chord_lengths(sites: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(sites, axis=0), axis=1))])
+
+
+def _folded(matrix: Array) -> Array:
+    """The map from values at n + 1 sites, the last of which is the first again, as one from n values."""
+    out = matrix[:, :-1].copy()
+    out[:, 0] += matrix[:, -1]
+    return out
+
+
+def _meeting(stations: Stations) -> Stations:
+    """The stations with the last one the first again, to the last bit."""
+    changes = {}
+    for name in (f.name for f in fields(Stations) if f.name != "arc_length"):
+        values = np.array(getattr(stations, name))
+        values[-1] = values[0]
+        changes[name] = values
+    return replace(stations, **changes)
+
+
+def _sizes(
+    templates: tuple[Template, ...], spread: Array, curvature: Array, settings: Settings
+) -> dict[str, Array]:
+    """Height, width, their deviations, and border at the stations.
+
+    spread (k, n): from values at the templates; curvature (k,): of the path.
+    """
     std = np.array([(q.std[6], q.std[7]) if q.std is not None else (np.inf, np.inf) for q in templates])
     widths = np.array([q.width for q in templates])
     width = np.maximum(spread @ widths, 0.25 * widths.min())
@@ -115,7 +195,6 @@ def _sizes(templates: tuple[Template, ...], at: Array, s: Array, settings: Setti
     sign = 1.0 if np.median(heights) > 0 else -1.0
     height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
     height_std, width_std = np.sqrt(spread**2 @ std**2).T
-    curvature = np.interp(s, at, [abs(q.trend[0]) for q in templates])
     border = np.minimum(
         (0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width)
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
@@ -73,3 +74,24 @@ class Template:
     def half_breadth(self) -> float:
         """Distance from the spine to the outer border of a flank."""
         return 0.5 * self.width + self.flank
+
+    @property
+    def apex(self) -> Array:
+        """(3,) point of the crest over the centre."""
+        return self.position + self.height * self.rotation[:, 2]
+
+    def slid(self, x: float) -> Template:
+        """The patch moved by x along its own bent path, its height and width as their slopes say.
+
+        Slopes are known nearby only: height and width change by no more than a half.
+        """
+        bend, rise, widening = self.trend
+        turn, _ = rotation_of(np.array([0.0, 0.0, bend * x]))
+        rate_h = 1.0 if not self.height else 1.0 + min(max(rise * x / self.height, -0.5), 0.5)
+        rate_w = 1.0 + min(max(widening * x / self.width, -0.5), 0.5)
+        return self.changed(
+            position=self.position + self.rotation @ np.array([x, 0.5 * bend * x**2, 0.0]),
+            rotation=self.rotation @ turn,
+            height=float(self.height * rate_h),
+            width=float(self.width * rate_w),
+        )

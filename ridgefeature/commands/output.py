@@ -64,9 +64,14 @@ def rows(ridge: Ridge) -> list[tuple[str, str]]:
         ),
         ("noise", f"{number(found['noise'], 3)} {unit}"),
         ("pick", point(ridge.pick)),
-        ("start stopped because", ridge.stop[0]),
-        ("end stopped because", ridge.stop[1]),
+        *_ends(ridge),
     ]
+
+
+def _ends(ridge: Ridge) -> list[tuple[str, str]]:
+    if ridge.closed:
+        return [("ends", "none, the ridge is closed")]
+    return [("start stopped because", ridge.stop[0]), ("end stopped because", ridge.stop[1])]
 
 
 def show(ridge: Ridge, files: dict[str, str]) -> None:

@@ -131,13 +131,16 @@ def _draw_flat(axes: Any, scene: Scene, eye: Camera, colours: Pixels, solid: boo
 
 
 def _mark(axes: Any, ridge: Ridge, eye: Camera) -> None:
-    """Start, end and pick."""
+    """Start, end and pick; of a ring the place where arc length begins."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=3, foreground="white")]
     top = eye.project(ridge.spine + ridge.height[:, None] * ridge.normal)
-    labels = "start, s = 0", f"end, s = {number(ridge.length)} {ridge.unit}"
-    for end, inner, label, face in ((0, 1, labels[0], "white"), (-1, -2, labels[1], SPINE)):
+    total = f"s = {number(ridge.length)} {ridge.unit}"
+    marks = [(0, 1, "start, s = 0", "white"), (-1, -2, f"end, {total}", SPINE)]
+    if ridge.closed:
+        marks = [(0, 1, f"closed, s = 0 and {total}", "white")]
+    for end, inner, label, face in marks:
         axes.plot(*top[end], "o", ms=9, mfc=face, mec=SPINE, mew=2, zorder=6)
         out = top[end] - top[inner]
         out = out / max(np.linalg.norm(out), 1e-300)
