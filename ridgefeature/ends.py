@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ridgefeature.improve import FEWEST_POINTS, loss_of
 from ridgefeature.kernels import chain
 from ridgefeature.kernels.algebra import rotation_of
+from ridgefeature.kernels.base import standing
 from ridgefeature.march import GOES_ON, Track, reverse
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -123,6 +124,8 @@ def _relength(template: Template, low: float, high: float) -> Template:
     bend = template.trend[0]
     turn, _ = rotation_of(np.array([0.0, 0.0, bend * middle]))
     shift = np.array([middle, 0.5 * bend * middle**2, 0.0])
+    if template.base.any():
+        shift, turn = standing(shift, turn, template.base)
     return template.changed(
         position=template.position + template.rotation @ shift,
         rotation=template.rotation @ turn,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels import appraise, residual
 from ridgefeature.kernels.algebra import moved
+from ridgefeature.kernels.base import found_terms, on_base, standing
 from ridgefeature.kernels.evidence import assess
 from ridgefeature.kernels.fit import bounds, fit
 from ridgefeature.kernels.objective import objective
@@ -118,8 +119,7 @@ def _minimise(
         most,
         getattr(nlopt, settings.algorithm),
     )
-    fitted = template.changed(position=position, rotation=rotation, height=height, width=width)
-    return fitted, evaluations, status_of(result)
+    return _standing(template, position, rotation, height, width), evaluations, status_of(result)
 
 
 def _minimise_distance(
@@ -155,12 +155,23 @@ def _moved(template: Template, transform: Array, q: Array) -> Template:
     position, rotation, height, width = moved(
         template.position, template.rotation, template.height, template.width, transform, q
     )
+    return _standing(template, position, rotation, height, width)
+
+
+def _standing(template: Template, position: Array, rotation: Array, height: float, width: float) -> Template:
+    """The template after a fit, which on a curved base saw that as flat: its frame goes along with the base."""
+    if template.base.any():
+        old = template.rotation
+        place, axes = standing(old.T @ (position - template.position), old.T @ rotation, template.base)
+        position, rotation = template.position + old @ place, old @ axes
     return template.changed(position=position, rotation=rotation, height=height, width=width)
 
 
 def sample(template: Template, along: int = 9, across: int = 21) -> Array:
     """Points (along * across, 3) spread evenly over the patch, flanks included, in the frame of the scan."""
     local = residual.sampled(*template.shape, template.length, template.half_breadth, along, across)
+    if template.base.any():
+        local = on_base(local, template.base)
     return template.position + local @ template.rotation.T
 
 
@@ -266,4 +277,7 @@ def _noted(
 def judge(points: Array, template: Template, settings: Settings) -> Template:
     """The template with standard deviations and counts as the points in its window (n, 3) give them."""
     std, inliers = appraise.deviations(points, *template.shape, template.scale, *loss_of(settings))
+    if template.base_std.any():
+        effect = found_terms(points, *template.shape, template.scale, *loss_of(settings))[2]
+        std[6:] = np.sqrt(std[6:] ** 2 + (effect * template.base_std) ** 2 @ np.ones(3))
     return template.changed(std=std, points=len(points), inliers=int(inliers))

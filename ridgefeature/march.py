@@ -43,6 +43,8 @@ class Track:
     stop: tuple[str, str]
     misfit: Array | None = None
     """(2, m) number and sum of residuals by distance from the spine, once the track is settled."""
+    base: tuple[Array, Array] | None = None
+    """Curvature terms of the base (n, 3) that each window asks for and their information (n, 3, 3), then."""
 
 
 def reverse(template: Template) -> Template:

@@ -18,7 +18,7 @@ from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
-from ridgefeature.settle import finish_ends, settle
+from ridgefeature.settle import finish_ends, settle, settle_base
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -104,7 +104,8 @@ def _track(
     first = _canonical(full, first, pick, hints)
     track = march(rough, full, first, settings, progress)
     track = place_ends(full, track, settings)
-    track = finish_ends(full, settle(full, track, settings), settings)
+    track = settle_base(full, settle(full, track, settings), settings)
+    track = finish_ends(full, track, settings)
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )

@@ -64,6 +64,9 @@ class Settings:
         25.0, "log likelihood ratio, doubled, above which a first window holds a ridge"
     )
     going_on: float = _setting(20.0, "the same for a window in which a known ridge is expected to go on")
+    base_chance: float = _setting(
+        1e-3, "chance at which a flat base is taken for a curved one; 0.5 or more: bases are flat"
+    )
     look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")
     max_templates: int = _setting(500, "templates in all")
 

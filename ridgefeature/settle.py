@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvature import curved, significant, terms_of
 from ridgefeature.ends import place_ends, trends
 from ridgefeature.improve import Limits, judge, limits_of, refine
 from ridgefeature.kernels import appraise
@@ -17,6 +18,9 @@ Array = NDArray[np.float64]
 
 _BINS = 16
 _SAME_LENGTH = 0.15
+_BASE_ROUNDS = 4
+_SETTLED = 0.1
+"""Change in standard deviations from round to round below which a base counts as found."""
 
 
 def _expected(templates: list[Template], i: int, settings: Settings) -> Limits:
@@ -33,11 +37,37 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     settings = settings.marching()
     bins = np.zeros((2, _BINS))
     judged = []
+    terms, information = np.zeros((len(known), 3)), np.zeros((len(known), 3, 3))
     for i in range(len(known)):
         new, points = _refit(window, known, i, settings)
         appraise.add_misfit(bins, points, *new.shape, misfit_scale(new))
+        if len(points):
+            terms[i], information[i] = terms_of(points, new, settings)
         judged.append(new)
-    return Track(tuple(judged), track.stop, bins)
+    return Track(tuple(judged), track.stop, bins, (terms, information))
+
+
+def settle_base(window: Window, track: Track, settings: Settings) -> Track:
+    """The settled track settled again on a curved base, where it is one beyond chance, until that stays."""
+    for _ in range(_BASE_ROUNDS):
+        if track.base is None or not significant(*track.base, settings.base_chance):
+            break
+        before = track.templates
+        known = curved(before, *track.base)
+        track = settle(window, Track(known, track.stop), settings)
+        if _alike(before, track.templates):
+            break
+    return track
+
+
+def _alike(before: tuple[Template, ...], after: tuple[Template, ...]) -> bool:
+    """Whether height and width of all templates changed by less than a part of their standard deviation."""
+    return all(
+        b.std is not None
+        and abs(a.height - b.height) < _SETTLED * b.std[6]
+        and abs(a.width - b.width) < _SETTLED * b.std[7]
+        for a, b in zip(before, after, strict=True)
+    )
 
 
 def _refit(window: Window, known: list[Template], i: int, settings: Settings) -> tuple[Template, Array]:

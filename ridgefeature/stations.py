@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix
 from ridgefeature.bspline import Curve
+from ridgefeature.kernels.base import on_base
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -67,7 +68,10 @@ def _unit(vectors: Array) -> Array:
 
 def _on_path(template: Template, x: float) -> Array:
     """Point of the template's bent spine at x along it."""
-    return template.position + template.rotation @ np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
+    place = np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
+    if template.base.any():
+        place = on_base(place[None], template.base)[0]
+    return template.position + template.rotation @ place
 
 
 def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:

@@ -32,6 +32,11 @@ class Template:
     section: Section
     trend: Array = field(default_factory=lambda: np.zeros(3))
     """(3,) curvature of the path, slopes of height and width along it: from the neighbours, not fitted."""
+    base: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) curvature of the base along the ridge, its twist, and its curvature across: found with its
+    neighbours, not fitted; zeros unless the data tell them. Positive where the base rises to both sides."""
+    base_std: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) one standard deviation of these, 0 where they are zeros."""
     std: Array | None = None
     """(8,) one standard deviation: translation (along: 0) and rotation in its own frame, height, width."""
     scale: float = 0.0

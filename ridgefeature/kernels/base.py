@@ -1,0 +1,286 @@
+"""Kernels of a curved base: points seen as if it were flat, how curved it is, and that along a chain.
+
+Near a template the base is z = (xx x^2 + 2 xy x y + yy y^2) / 2 in its frame. Points are flattened: x becomes
+arc length along the base, y the distance across within it, z the height along its normal (Fermi coordinates,
+to third order: do Carmo, Differential Geometry, 4-2). So every other kernel sees a ridge on a plane.
+`terms` (3,) are xx, xy, yy: normal curvature along the ridge, twist, and curvature across.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.algebra import cholesky_in_place, facing, solve_in_place
+from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split
+
+Floats = NDArray[np.float64]
+_MODES = 4
+_PLACED, _SIZED = 5, 7
+_ROWS = _SIZED + 3 + _MODES
+
+
+@njit(cache=True)
+def _height(x: float, y: float, terms: Floats) -> tuple[float, float, float]:
+    """Height of the base over (x, y), and its slopes. Curvature stays along: a circle's, to fourth order."""
+    a, b = terms[0] * x + terms[1] * y, terms[1] * x + terms[2] * y
+    steep = 0.25 * (a * a + b * b)
+    return 0.5 * (x * a + y * b) * (1.0 + steep), a * (1.0 + 2.0 * steep), b * (1.0 + 2.0 * steep)
+
+
+@njit(cache=True)
+def _bowed(x: float, y: float, terms: Floats) -> tuple[float, float]:
+    """How much arc length and distance on the base exceed x and y, to third order."""
+    xx, xy, yy = terms[0], terms[1], terms[2]
+    along = xx * x * (xx * x * x / 6.0 + 0.5 * xy * x * y + 0.5 * yy * y * y)
+    across = y * (yy * yy * y * y / 6.0 + 0.5 * xy * yy * x * y + 0.5 * xy * xy * x * x)
+    return along, across
+
+
+@njit(cache=True)
+def flattened(points: Floats, terms: Floats) -> Floats:
+    """Points (n, 3) of a template's frame as they would lie if its base were flat."""
+    out = np.empty_like(points)
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        foot_x, foot_y = x, y
+        up = 0.0
+        for _ in range(6):
+            base, a, b = _height(foot_x, foot_y, terms)
+            square = 1.0 + a * a + b * b
+            up = (z - base - a * (x - foot_x) - b * (y - foot_y)) / square
+            foot_x, foot_y = x + up * a, y + up * b
+        along, across = _bowed(foot_x, foot_y, terms)
+        _, a, b = _height(foot_x, foot_y, terms)
+        out[i, 0], out[i, 1], out[i, 2] = foot_x + along, foot_y + across, up * math.sqrt(1.0 + a * a + b * b)
+    return out
+
+
+@njit(cache=True)
+def on_base(points: Floats, terms: Floats) -> Floats:
+    """Points (n, 3) given as if the base were flat, as they lie in the template's frame."""
+    out = np.empty_like(points)
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        for _ in range(4):
+            along, across = _bowed(x, y, terms)
+            x, y = points[i, 0] - along, points[i, 1] - across
+        base, a, b = _height(x, y, terms)
+        up = points[i, 2] / math.sqrt(1.0 + a * a + b * b)
+        out[i, 0], out[i, 1], out[i, 2] = x - up * a, y - up * b, base + up
+    return out
+
+
+@njit(cache=True)
+def standing(place: Floats, turn: Floats, terms: Floats) -> tuple[Floats, Floats]:
+    """Position (3,) and axes (3, 3), in the template's frame, of what is placed and turned as if it was flat."""
+    position = on_base(place.copy().reshape(1, 3), terms)[0]
+    foot = on_base(np.array([[place[0], place[1], 0.0]]), terms)[0]
+    _, a, b = _height(foot[0], foot[1], terms)
+    frame = facing(np.array([-a, -b, 1.0]) / math.sqrt(1.0 + a * a + b * b), np.array([1.0, 0.0, 0.0]))
+    axes = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                axes[i, j] += frame[i, k] * turn[k, j]
+    return position, axes
+
+
+@njit(**OPTIONS)
+def _all_rows(
+    points: Floats, height: float, width: float, trend: Floats, table: Floats
+) -> tuple[Floats, Floats]:
+    """Residuals (n,) and their derivatives (14, n): placement 5, height, width, terms 3, section's shape 4."""
+    bend, rise, widening = trend[0], trend[1], trend[2]
+    constant, linear, quadratic, cubic = split(table)
+    n = points.shape[0]
+    r, out = np.empty(n), np.empty((_ROWS, n))
+    for i in range(n):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        r[i], r_x, r_y, r_z, r_h, r_w = residual_jet(
+            x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
+        )
+        out[0, i], out[1, i] = -r_y, -r_z
+        out[2, i], out[3, i], out[4, i] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
+        out[5, i], out[6, i] = r_h, r_w
+        # Height over the base falls, and with the normal the foot of what stands on it moves.
+        out[_SIZED, i] = -0.5 * x * x * r_z + z * x * r_x
+        out[_SIZED + 1, i] = -x * y * r_z + z * (y * r_x + x * r_y)
+        out[_SIZED + 2, i] = -0.5 * y * y * r_z + z * y * r_y
+        lean = bend * x / max(1.0 - bend * y, 0.2)
+        eta = (y - 0.5 * lean * x) / max(width + widening * x, 0.1 * width)
+        square = min(4.0 * eta * eta, 1.0)
+        shape = r_z * (1.0 - square) ** 2
+        for k in range(_MODES):
+            out[_SIZED + 3 + k, i] = shape
+            shape *= square
+    return r, out
+
+
+@njit(**OPTIONS)
+def found_terms(
+    points: Floats,
+    height: float,
+    width: float,
+    trend: Floats,
+    table: Floats,
+    scale: float,
+    loss: int,
+    tuning: float,
+) -> tuple[Floats, Floats, Floats]:
+    """Change of the terms that the residuals ask for (3,), its information (3, 3), and what it would change.
+
+    One step of robust least squares (Huber 1981, 7.6) in placement, terms and an even shape of the section,
+    so that a wrong section is not taken for a curved base: what counts are the flanks. The information is
+    zero where the points do not tell. The last (2, 3): derivatives of the fitted height and width by terms
+    that are given.
+    """
+    step, information, effect = np.zeros(3), np.zeros((3, 3)), np.zeros((2, 3))
+    r, rows = _all_rows(points, height, width, trend, table)
+    inside = np.zeros(r.size)
+    pull = np.zeros(r.size)
+    inliers = 0
+    square = slope = 0.0
+    for i in range(r.size):
+        s = r[i] / scale
+        if abs(s) < tuning:
+            inside[i] = 1.0
+            inliers += 1
+            pull[i] = loss_jet(s, loss, tuning)[1]
+            square += pull[i] * pull[i]
+            above, below = loss_jet(s + 1e-4, loss, tuning)[1], loss_jet(s - 1e-4, loss, tuning)[1]
+            slope += (above - below) / 2e-4
+    if inliers <= _ROWS or not slope > 0.0:
+        return step, information, effect
+    gram, right = np.empty((_ROWS, _ROWS)), np.empty(_ROWS)
+    for j in range(_ROWS):
+        right[j] = (rows[j] * pull).sum() * scale * inliers / slope
+        for k in range(j + 1):
+            gram[j, k] = gram[k, j] = (rows[j] * rows[k] * inside).sum()
+    _effect(gram, effect)
+    others = np.array([0, 1, 2, 3, 4, 10, 11, 12, 13])
+    if not _without(gram, right, others):
+        return step, information, effect
+    variance = scale * scale * square * inliers * inliers / (slope * slope * (inliers - 12.0))
+    for j in range(3):
+        step[j] = -right[_SIZED + j]
+        for k in range(3):
+            information[j, k] = gram[_SIZED + j, _SIZED + k]
+    if not solve_in_place(information.copy(), step):
+        return np.zeros(3), np.zeros((3, 3)), effect
+    return step, information / variance, effect
+
+
+@njit(cache=True)
+def _effect(gram: Floats, effect: Floats) -> None:
+    """Derivatives (2, 3) of height and width by the terms, where placement and both are fitted."""
+    for j in range(3):
+        column = -gram[:_SIZED, _SIZED + j].copy()
+        if solve_in_place(gram[:_SIZED, :_SIZED].copy(), column):
+            effect[0, j], effect[1, j] = column[5], column[6]
+
+
+@njit(cache=True)
+def _without(gram: Floats, right: Floats, others: NDArray[np.int64]) -> bool:
+    """Take the other parameters out of the terms' part of the normal equations (Schur complement)."""
+    m = others.size
+    inner, column = np.empty((m, m)), np.empty((m, 4))
+    for j in range(m):
+        column[j, 3] = right[others[j]]
+        for k in range(m):
+            inner[j, k] = gram[others[j], others[k]]
+        inner[j, j] *= 1.0 + 1e-9
+        for k in range(3):
+            column[j, k] = gram[others[j], _SIZED + k]
+    if not cholesky_in_place(inner):
+        return False
+    for j in range(m):
+        for c in range(4):
+            for k in range(j):
+                column[j, c] -= inner[j, k] * column[k, c]
+            column[j, c] /= inner[j, j]
+    for j in range(3):
+        for i in range(m):
+            right[_SIZED + j] -= column[i, j] * column[i, 3]
+            for k in range(3):
+                gram[_SIZED + j, _SIZED + k] -= column[i, j] * column[i, k]
+    return True
+
+
+@njit(cache=True)
+def _inverse(a: Floats) -> Floats:
+    """Inverse (3, 3) of a symmetric positive definite matrix; zeros where it is none."""
+    out = np.zeros((3, 3))
+    for j in range(3):
+        column = np.zeros(3)
+        column[j] = 1.0
+        if not solve_in_place(a.copy(), column):
+            return np.zeros((3, 3))
+        out[:, j] = column
+    return 0.5 * (out + out.T)
+
+
+@njit(cache=True)
+def _log_determinant(a: Floats) -> float:
+    """Of a symmetric positive definite matrix (3, 3)."""
+    factor = a.copy()
+    if not cholesky_in_place(factor):
+        return -np.inf
+    return 2.0 * (math.log(factor[0, 0]) + math.log(factor[1, 1]) + math.log(factor[2, 2]))
+
+
+@njit(cache=True)
+def _times(a: Floats, b: Floats) -> Floats:
+    """Product of (3, 3) and (3,)."""
+    out = np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            out[i] += a[i, k] * b[k]
+    return out
+
+
+@njit(cache=True)
+def smoothed(at: Floats, found: Floats, information: Floats, drift: float) -> tuple[Floats, Floats, float]:
+    """Terms along a chain (n, 3) that wander by `drift` a length, their variances, the log likelihood of it.
+
+    at (n,): arc lengths; found (n, 3) with its information (n, 3, 3). Random walk with nothing known of its
+    start, by elimination of the block tridiagonal normal equations from both ends (Rauch, Tung and Striebel
+    1965). The likelihood is known but for a constant.
+    """
+    n = at.size
+    tie = np.zeros(n + 1)
+    for i in range(1, n):
+        tie[i] = 1.0 / (drift * max(at[i] - at[i - 1], 1e-12 * at[n - 1]))
+    ahead, back = np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
+    right = np.zeros((n, 3))
+    one = np.eye(3)
+    likelihood = 0.0
+    for i in range(n):
+        own = information[i] + (tie[i] + tie[i + 1]) * one
+        ahead[i], right[i] = own, _times(information[i], found[i])
+        if i > 0:
+            link = _inverse(ahead[i - 1])
+            ahead[i] -= tie[i] * tie[i] * link
+            right[i] += tie[i] * _times(link, right[i - 1])
+            likelihood += 1.5 * math.log(tie[i])
+        likelihood -= 0.5 * _log_determinant(ahead[i])
+    terms, variance = np.zeros((n, 3)), np.zeros((n, 3))
+    for i in range(n - 1, -1, -1):
+        back[i] = information[i] + (tie[i] + tie[i + 1]) * one
+        rest = right[i].copy()
+        if i < n - 1:
+            back[i] -= tie[i + 1] * tie[i + 1] * _inverse(back[i + 1])
+            rest += tie[i + 1] * terms[i + 1]
+        terms[i] = _times(_inverse(ahead[i]), rest)
+        whole = _inverse(ahead[i] + back[i] - information[i] - (tie[i] + tie[i + 1]) * one)
+        for k in range(3):
+            variance[i, k] = whole[k, k]
+    for i in range(n):
+        gap = found[i] - terms[i]
+        likelihood -= 0.5 * (gap * _times(information[i], gap)).sum()
+        if i > 0:
+            likelihood -= 0.5 * tie[i] * ((terms[i] - terms[i - 1]) ** 2).sum()
+    return terms, variance, likelihood
