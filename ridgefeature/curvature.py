@@ -2,26 +2,72 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import loss_of
+from ridgefeature.improve import FEWEST_POINTS, floor, improve, loss_of
 from ridgefeature.kernels.base import found_terms, smoothed
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
+from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 
+_LARGEST = 0.5
+"""Largest slope of the base at the outer border of a template's flanks."""
+_ROUNDS = 3
+_SURE = 0.1
+"""Part of the allowed chance that one template alone may use up: a march asks many times."""
+_KEPT = 0.6
+"""What of earlier templates still counts at the next one."""
 _DRIFTS = 10.0 ** np.arange(-10, 0)
 """Tried drifts of the terms: variance a length, in powers of the width."""
 
 
 def terms_of(points: Array, template: Template, settings: Settings) -> tuple[Array, Array]:
-    """The base's terms (3,) that the points of a fitted template's window ask for, and their information."""
-    step, information, _ = found_terms(points, *template.shape, template.scale, *loss_of(settings))
-    return template.base + step, information
+    """The base's terms (3,) that the points of a template's window ask for, and their information (3, 3)."""
+    if len(points) < FEWEST_POINTS:
+        return template.base, np.zeros((3, 3))
+    step, information, _ = found_terms(points, *template.shape, floor(template), *loss_of(settings))
+    most = _LARGEST / template.half_breadth
+    return np.minimum(np.maximum(template.base + step, -most), most), information
+
+
+def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
+    """The start improved on a base as curved as its window says; None where that says nothing of it."""
+    fitted = start
+    for _ in range(_ROUNDS):
+        terms, information = terms_of(window(fitted), fitted, settings)
+        if not significant(terms[None], information[None], _SURE * settings.base_chance):
+            return None
+        fitted = improve(window, fitted.changed(base=terms), settings)
+        if fitted.status in ("failed", "no data"):
+            return None
+    return fitted
+
+
+@dataclass(eq=False)
+class Ahead:
+    """What a march knows of the base ahead, from the templates behind; it forgets as it goes on."""
+
+    settings: Settings
+    information: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    pull: Array = field(default_factory=lambda: np.zeros(3))
+
+    def add(self, window: Window, template: Template) -> Template:
+        """Learn from a fitted template; it is returned with the terms that are now expected of the base."""
+        terms, information = terms_of(window(template), template, self.settings)
+        self.information = _KEPT * self.information + information
+        self.pull = _KEPT * self.pull + information @ terms
+        if not np.linalg.matrix_rank(self.information) == 3:
+            return template
+        mean = np.linalg.solve(self.information, self.pull)
+        if significant(mean[None], self.information[None], _SURE * self.settings.base_chance):
+            return template.changed(base=mean)
+        return template.changed(base=np.zeros(3)) if template.base.any() else template
 
 
 def significant(terms: Array, information: Array, chance: float) -> bool:

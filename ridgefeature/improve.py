@@ -81,7 +81,8 @@ def loss_of(settings: Settings) -> tuple[int, float]:
     return _LOSS[settings.loss], settings.tuning
 
 
-def _floor(template: Template) -> float:
+def floor(template: Template) -> float:
+    """Least noise scale of a template's residuals."""
     return _LEAST_SCALE * max(abs(template.height), 1e-3 * template.width)
 
 
@@ -98,7 +99,7 @@ def _minimise(
     c = c_functions()
     if c is None:
         _, transform, problem = appraise.prepare(
-            points, *template.shape, _floor(template), limits.prior, *loss
+            points, *template.shape, floor(template), limits.prior, *loss
         )
 
         def value(q: Array, gradient: Array) -> float:
@@ -111,7 +112,7 @@ def _minimise(
         template.position,
         template.rotation,
         *template.shape,
-        _floor(template),
+        floor(template),
         limits.prior,
         *loss,
         limits.range,
@@ -127,7 +128,7 @@ def _minimise_distance(
 ) -> tuple[Template, int, str]:
     """The template after one optimisation of its mean distance M to the scan (Eq. 3, 4); as `_minimise`."""
     scale, transform, _ = appraise.prepare(
-        window(template), *template.shape, _floor(template), limits.prior, *_HUBER
+        window(template), *template.shape, floor(template), limits.prior, *_HUBER
     )
 
     def value(q: Array, _: Array) -> float:
@@ -267,7 +268,7 @@ def _noted(
     Misfit of a few per cent of the height is no evidence.
     """
     contrast = _LEAST_CONTRAST * abs(template.height)
-    scale, far, evidence = assess(points, *template.shape, _floor(template), contrast, *loss_of(settings))
+    scale, far, evidence = assess(points, *template.shape, floor(template), contrast, *loss_of(settings))
     noted = template.changed(
         scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence
     )
@@ -278,6 +279,6 @@ def judge(points: Array, template: Template, settings: Settings) -> Template:
     """The template with standard deviations and counts as the points in its window (n, 3) give them."""
     std, inliers = appraise.deviations(points, *template.shape, template.scale, *loss_of(settings))
     if template.base_std.any():
-        effect = found_terms(points, *template.shape, template.scale, *loss_of(settings))[2]
+        effect = found_terms(points, *template.shape, floor(template), *loss_of(settings))[2]
         std[6:] = np.sqrt(std[6:] ** 2 + (effect * template.base_std) ** 2 @ np.ones(3))
     return template.changed(std=std, points=len(points), inliers=int(inliers))

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvature import Ahead
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
 from ridgefeature.kernels import chain as kernel
+from ridgefeature.kernels.base import flattened, standing
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -77,8 +79,21 @@ def append(chain: list[Template], settings: Settings, longest: bool = False) -> 
         evidence=0.0,
         status="start",
     )
-    found = kernel.starts(positions, frames, last.length, length)
+    found = _starts_on_base(last, positions, frames, length)
     return [start.changed(position=place, rotation=axes) for place, axes in zip(*found, strict=True)]
+
+
+def _starts_on_base(last: Template, positions: Array, frames: Array, length: float) -> tuple[Array, Array]:
+    """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved."""
+    if not last.base.any():
+        return kernel.starts(positions, frames, last.length, length)
+    own = last.rotation
+    places = flattened((positions - last.position) @ own, last.base)
+    turned = [own.T @ f for f in frames]
+    axes = np.array([standing(p, np.eye(3), last.base)[1].T @ f for p, f in zip(places, turned, strict=True)])
+    found = kernel.starts(places, axes, last.length, length)
+    laid = [standing(p, f, last.base) for p, f in zip(*found, strict=True)]
+    return np.array([last.position + own @ p for p, _ in laid]), np.array([own @ f for _, f in laid])
 
 
 def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = False) -> str:
@@ -192,6 +207,8 @@ def march_one_way(
     known: what is known so far, in the direction of the march; not changed.
     """
     chain, reason, skipped = list(known), "", 0.0
+    base = Ahead(settings)
+    chain[-3:] = [base.add(rough, template) for template in chain[-3:]]
     while len(known) + len(found) < settings.max_templates:
         start, fitted, why = _fit_next(rough, full, chain, skipped > 0, settings)
         if why:
@@ -205,7 +222,7 @@ def march_one_way(
             return reason or _RAN_BACK
         reason, skipped = "", 0.0
         found.append(fitted)
-        chain.append(fitted)
+        chain.append(base.add(rough, fitted))
         if progress is not None:
             progress(fitted)
     return f"max_templates ({settings.max_templates}) reached"

@@ -127,7 +127,11 @@ def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Te
     a march both ways would else start either way.
     """
     if hints.kind != "auto" and (first.height < 0) != (hints.kind == "groove"):
-        first = first.changed(rotation=first.rotation * np.array([1.0, -1.0, -1.0]), height=-first.height)
+        first = first.changed(
+            rotation=first.rotation * np.array([1.0, -1.0, -1.0]),
+            height=-first.height,
+            base=first.base * np.array([-1.0, 1.0, -1.0]),
+        )
     x, _, z = window(first).T
     return reverse(first) if x @ z * first.height < 0 else first
 

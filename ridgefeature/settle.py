@@ -50,10 +50,13 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
 def settle_base(window: Window, track: Track, settings: Settings) -> Track:
     """The settled track settled again on a curved base, where it is one beyond chance, until that stays."""
     for _ in range(_BASE_ROUNDS):
-        if track.base is None or not significant(*track.base, settings.base_chance):
-            break
         before = track.templates
-        known = curved(before, *track.base)
+        if track.base is not None and significant(*track.base, settings.base_chance):
+            known = curved(before, *track.base)
+        elif any(t.base.any() for t in before):
+            known = tuple(t.changed(base=np.zeros(3), base_std=np.zeros(3)) for t in before)
+        else:
+            break
         track = settle(window, Track(known, track.stop), settings)
         if _alike(before, track.templates):
             break

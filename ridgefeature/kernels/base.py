@@ -15,12 +15,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import cholesky_in_place, facing, solve_in_place
-from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split
+from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split, weight_of
 
 Floats = NDArray[np.float64]
-_MODES = 4
-_PLACED, _SIZED = 5, 7
-_ROWS = _SIZED + 3 + _MODES
+_PLACED, _MODES = 5, 4
+_FREE = _PLACED + 3 + _MODES
+_ROWS = _FREE + 2
+_REWEIGHTED = 6
+_SAME_SCALE = 0.03
 
 
 @njit(cache=True)
@@ -93,7 +95,7 @@ def standing(place: Floats, turn: Floats, terms: Floats) -> tuple[Floats, Floats
 def _all_rows(
     points: Floats, height: float, width: float, trend: Floats, table: Floats
 ) -> tuple[Floats, Floats]:
-    """Residuals (n,) and their derivatives (14, n): placement 5, height, width, terms 3, section's shape 4."""
+    """Residuals (n,) and their derivatives (14, n): placement 5, terms 3, section's shape 4, height, width."""
     bend, rise, widening = trend[0], trend[1], trend[2]
     constant, linear, quadratic, cubic = split(table)
     n = points.shape[0]
@@ -105,19 +107,33 @@ def _all_rows(
         )
         out[0, i], out[1, i] = -r_y, -r_z
         out[2, i], out[3, i], out[4, i] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
-        out[5, i], out[6, i] = r_h, r_w
+        out[_FREE, i], out[_FREE + 1, i] = r_h, r_w
         # Height over the base falls, and with the normal the foot of what stands on it moves.
-        out[_SIZED, i] = -0.5 * x * x * r_z + z * x * r_x
-        out[_SIZED + 1, i] = -x * y * r_z + z * (y * r_x + x * r_y)
-        out[_SIZED + 2, i] = -0.5 * y * y * r_z + z * y * r_y
+        out[_PLACED, i] = -0.5 * x * x * r_z + z * x * r_x
+        out[_PLACED + 1, i] = -x * y * r_z + z * (y * r_x + x * r_y)
+        out[_PLACED + 2, i] = -0.5 * y * y * r_z + z * y * r_y
         lean = bend * x / max(1.0 - bend * y, 0.2)
         eta = (y - 0.5 * lean * x) / max(width + widening * x, 0.1 * width)
         square = min(4.0 * eta * eta, 1.0)
         shape = r_z * (1.0 - square) ** 2
         for k in range(_MODES):
-            out[_SIZED + 3 + k, i] = shape
+            out[_PLACED + 3 + k, i] = shape
             shape *= square
     return r, out
+
+
+@njit(**OPTIONS)
+def _gram(rows: Floats, weights: Floats) -> Floats:
+    """Weighted sums (14, 14) of the products of rows (14, n)."""
+    out = np.empty((_ROWS, _ROWS))
+    for j in range(_ROWS):
+        weighted = rows[j] * weights
+        for k in range(j + 1):
+            row, total = rows[k], 0.0
+            for i in range(weights.size):
+                total += weighted[i] * row[i]
+            out[j, k] = out[k, j] = total
+    return out
 
 
 @njit(**OPTIONS)
@@ -127,87 +143,85 @@ def found_terms(
     width: float,
     trend: Floats,
     table: Floats,
-    scale: float,
+    floor: float,
     loss: int,
     tuning: float,
 ) -> tuple[Floats, Floats, Floats]:
-    """Change of the terms that the residuals ask for (3,), its information (3, 3), and what it would change.
+    """Change of the terms that the points ask for (3,), its information (3, 3), and what terms would change.
 
-    One step of robust least squares (Huber 1981, 7.6) in placement, terms and an even shape of the section,
-    so that a wrong section is not taken for a curved base: what counts are the flanks. The information is
-    zero where the points do not tell. The last (2, 3): derivatives of the fitted height and width by terms
-    that are given.
+    Robust least squares by reweighting (Huber 1981, 7.6 and 7.8) in placement, terms and an even shape of the
+    section, about the template as it stands, so that a wrong section is not taken for a curved base: what
+    counts are the flanks. The noise scale is that of what remains, not below floor. The information is zero
+    where the points do not tell. The last (2, 3): derivatives of fitted height and width by given terms.
     """
     step, information, effect = np.zeros(3), np.zeros((3, 3)), np.zeros((2, 3))
+    n = points.shape[0]
+    if n < 2 * _ROWS:
+        return step, information, effect
     r, rows = _all_rows(points, height, width, trend, table)
-    inside = np.zeros(r.size)
-    pull = np.zeros(r.size)
+    left, weights, change = r.copy(), np.empty(n), np.zeros(_FREE)
+    scale = max(1.4826 * np.median(np.abs(r)), floor)
+    for _ in range(_REWEIGHTED):
+        for i in range(n):
+            weights[i] = weight_of(left[i] / scale, loss, tuning)
+        for j in range(_FREE):
+            change[j] = -(rows[j] * weights * r).sum()
+        if not solve_in_place(_gram(rows, weights)[:_FREE, :_FREE].copy(), change):
+            return step, information, effect
+        left[:] = r
+        for j in range(_FREE):
+            left += change[j] * rows[j]
+        before = scale
+        scale = max(1.4826 * np.median(np.abs(left)) / math.sqrt(1.0 - _FREE / n), floor)
+        if abs(scale - before) < _SAME_SCALE * before:
+            break
     inliers = 0
     square = slope = 0.0
-    for i in range(r.size):
-        s = r[i] / scale
+    for i in range(n):
+        s = left[i] / scale
+        weights[i] = 1.0 if abs(s) < tuning else 0.0
         if abs(s) < tuning:
-            inside[i] = 1.0
             inliers += 1
-            pull[i] = loss_jet(s, loss, tuning)[1]
-            square += pull[i] * pull[i]
+            square += loss_jet(s, loss, tuning)[1] ** 2
             above, below = loss_jet(s + 1e-4, loss, tuning)[1], loss_jet(s - 1e-4, loss, tuning)[1]
             slope += (above - below) / 2e-4
     if inliers <= _ROWS or not slope > 0.0:
         return step, information, effect
-    gram, right = np.empty((_ROWS, _ROWS)), np.empty(_ROWS)
-    for j in range(_ROWS):
-        right[j] = (rows[j] * pull).sum() * scale * inliers / slope
-        for k in range(j + 1):
-            gram[j, k] = gram[k, j] = (rows[j] * rows[k] * inside).sum()
-    _effect(gram, effect)
-    others = np.array([0, 1, 2, 3, 4, 10, 11, 12, 13])
-    if not _without(gram, right, others):
-        return step, information, effect
-    variance = scale * scale * square * inliers * inliers / (slope * slope * (inliers - 12.0))
-    for j in range(3):
-        step[j] = -right[_SIZED + j]
-        for k in range(3):
-            information[j, k] = gram[_SIZED + j, _SIZED + k]
-    if not solve_in_place(information.copy(), step):
-        return np.zeros(3), np.zeros((3, 3)), effect
-    return step, information / variance, effect
+    gram = _gram(rows, weights)
+    variance = scale * scale * square * inliers * inliers / (slope * slope * (inliers - _FREE))
+    step[:] = change[_PLACED : _PLACED + 3]
+    information = _inverse(_block_of_inverse(gram[:_FREE, :_FREE]) * variance)
+    return step, information, _effect(gram)
 
 
 @njit(cache=True)
-def _effect(gram: Floats, effect: Floats) -> None:
+def _block_of_inverse(gram: Floats) -> Floats:
+    """Block (3, 3) for the terms of the inverse of normal equations (12, 12); zeros where there is none."""
+    out = np.zeros((3, 3))
+    for j in range(3):
+        column = np.zeros(gram.shape[0])
+        column[_PLACED + j] = 1.0
+        if not solve_in_place(gram.copy(), column):
+            return np.zeros((3, 3))
+        out[:, j] = column[_PLACED : _PLACED + 3]
+    return out
+
+
+@njit(cache=True)
+def _effect(gram: Floats) -> Floats:
     """Derivatives (2, 3) of height and width by the terms, where placement and both are fitted."""
-    for j in range(3):
-        column = -gram[:_SIZED, _SIZED + j].copy()
-        if solve_in_place(gram[:_SIZED, :_SIZED].copy(), column):
-            effect[0, j], effect[1, j] = column[5], column[6]
-
-
-@njit(cache=True)
-def _without(gram: Floats, right: Floats, others: NDArray[np.int64]) -> bool:
-    """Take the other parameters out of the terms' part of the normal equations (Schur complement)."""
-    m = others.size
-    inner, column = np.empty((m, m)), np.empty((m, 4))
-    for j in range(m):
-        column[j, 3] = right[others[j]]
-        for k in range(m):
-            inner[j, k] = gram[others[j], others[k]]
-        inner[j, j] *= 1.0 + 1e-9
-        for k in range(3):
-            column[j, k] = gram[others[j], _SIZED + k]
-    if not cholesky_in_place(inner):
-        return False
-    for j in range(m):
-        for c in range(4):
-            for k in range(j):
-                column[j, c] -= inner[j, k] * column[k, c]
-            column[j, c] /= inner[j, j]
-    for j in range(3):
-        for i in range(m):
-            right[_SIZED + j] -= column[i, j] * column[i, 3]
-            for k in range(3):
-                gram[_SIZED + j, _SIZED + k] -= column[i, j] * column[i, k]
-    return True
+    fitted = np.array([0, 1, 2, 3, 4, _FREE, _FREE + 1])
+    normal, out = np.empty((7, 7)), np.zeros((2, 3))
+    for j in range(7):
+        for k in range(7):
+            normal[j, k] = gram[fitted[j], fitted[k]]
+    for k in range(3):
+        column = np.empty(7)
+        for j in range(7):
+            column[j] = -gram[fitted[j], _PLACED + k]
+        if solve_in_place(normal.copy(), column):
+            out[0, k], out[1, k] = column[5], column[6]
+    return out
 
 
 @njit(cache=True)
