@@ -15,13 +15,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import cholesky_in_place, facing, solve_in_place
-from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split, weight_of
+from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split
 
 Floats = NDArray[np.float64]
 _PLACED, _MODES = 5, 4
 _FREE = _PLACED + 3 + _MODES
 _ROWS = _FREE + 2
-_REWEIGHTED = 6
+_SCORED = 8
 _SAME_SCALE = 0.03
 
 
@@ -108,10 +108,12 @@ def _all_rows(
         out[0, i], out[1, i] = -r_y, -r_z
         out[2, i], out[3, i], out[4, i] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
         out[_FREE, i], out[_FREE + 1, i] = r_h, r_w
-        # Height over the base falls, and with the normal the foot of what stands on it moves.
-        out[_PLACED, i] = -0.5 * x * x * r_z + z * x * r_x
-        out[_PLACED + 1, i] = -x * y * r_z + z * (y * r_x + x * r_y)
-        out[_PLACED + 2, i] = -0.5 * y * y * r_z + z * y * r_y
+        # Height over the base falls, and with the normal the foot of what stands on it moves. Its height is
+        # that of the section: the point's own noise would pull the terms one way.
+        stands = z - r[i] / r_z
+        out[_PLACED, i] = -0.5 * x * x * r_z + stands * x * r_x
+        out[_PLACED + 1, i] = -x * y * r_z + stands * (y * r_x + x * r_y)
+        out[_PLACED + 2, i] = -0.5 * y * y * r_z + stands * y * r_y
         lean = bend * x / max(1.0 - bend * y, 0.2)
         eta = (y - 0.5 * lean * x) / max(width + widening * x, 0.1 * width)
         square = min(4.0 * eta * eta, 1.0)
@@ -149,7 +151,7 @@ def found_terms(
 ) -> tuple[Floats, Floats, Floats]:
     """Change of the terms that the points ask for (3,), its information (3, 3), and what terms would change.
 
-    Robust least squares by reweighting (Huber 1981, 7.6 and 7.8) in placement, terms and an even shape of the
+    Robust least squares by scoring (Huber 1981, 7.6 and 7.8) in placement, terms and an even shape of the
     section, about the template as it stands, so that a wrong section is not taken for a curved base: what
     counts are the flanks. The noise scale is that of what remains, not below floor. The information is zero
     where the points do not tell. The last (2, 3): derivatives of fitted height and width by given terms.
@@ -159,39 +161,47 @@ def found_terms(
     if n < 2 * _ROWS:
         return step, information, effect
     r, rows = _all_rows(points, height, width, trend, table)
-    left, weights, change = r.copy(), np.empty(n), np.zeros(_FREE)
+    left, inside, psi, change = r.copy(), np.empty(n), np.empty(n), np.zeros(_FREE)
+    gram, factor = np.empty((_ROWS, _ROWS)), 0.0
     scale = max(1.4826 * np.median(np.abs(r)), floor)
-    for _ in range(_REWEIGHTED):
-        for i in range(n):
-            weights[i] = weight_of(left[i] / scale, loss, tuning)
-        for j in range(_FREE):
-            change[j] = -(rows[j] * weights * r).sum()
-        if not solve_in_place(_gram(rows, weights)[:_FREE, :_FREE].copy(), change):
+    for _ in range(_SCORED):
+        inliers, square, slope = _inside(left, scale, loss, tuning, inside, psi)
+        if inliers <= _ROWS or not slope > 0.0:
             return step, information, effect
-        left[:] = r
+        gram = _gram(rows, inside)
+        factor = square * inliers * inliers / (slope * slope * (inliers - _FREE))
+        right = np.empty(_FREE)
         for j in range(_FREE):
-            left += change[j] * rows[j]
+            right[j] = -(rows[j] * psi).sum() * scale * inliers / slope
+        if not solve_in_place(gram[:_FREE, :_FREE].copy(), right):
+            return step, information, effect
+        change += right
+        for j in range(_FREE):
+            left += right[j] * rows[j]
         before = scale
         scale = max(1.4826 * np.median(np.abs(left)) / math.sqrt(1.0 - _FREE / n), floor)
         if abs(scale - before) < _SAME_SCALE * before:
             break
-    inliers = 0
-    square = slope = 0.0
-    for i in range(n):
-        s = left[i] / scale
-        weights[i] = 1.0 if abs(s) < tuning else 0.0
-        if abs(s) < tuning:
-            inliers += 1
-            square += loss_jet(s, loss, tuning)[1] ** 2
-            above, below = loss_jet(s + 1e-4, loss, tuning)[1], loss_jet(s - 1e-4, loss, tuning)[1]
-            slope += (above - below) / 2e-4
-    if inliers <= _ROWS or not slope > 0.0:
-        return step, information, effect
-    gram = _gram(rows, weights)
-    variance = scale * scale * square * inliers * inliers / (slope * slope * (inliers - _FREE))
     step[:] = change[_PLACED : _PLACED + 3]
-    information = _inverse(_block_of_inverse(gram[:_FREE, :_FREE]) * variance)
+    information = _inverse(_block_of_inverse(gram[:_FREE, :_FREE]) * (scale * scale * factor))
     return step, information, _effect(gram)
+
+
+@njit(**OPTIONS)
+def _inside(
+    r: Floats, scale: float, loss: int, tuning: float, inside: Floats, psi: Floats
+) -> tuple[float, float, float]:
+    """Which residuals (n,) lie within `tuning` scales and their psi; the number, sums of psi^2 and slopes."""
+    inliers = square = slope = 0.0
+    for i in range(r.size):
+        s = r[i] / scale
+        inside[i] = 1.0 if abs(s) < tuning else 0.0
+        psi[i] = inside[i] * loss_jet(s, loss, tuning)[1]
+        inliers += inside[i]
+        square += psi[i] * psi[i]
+        above, below = loss_jet(s + 1e-4, loss, tuning)[1], loss_jet(s - 1e-4, loss, tuning)[1]
+        slope += inside[i] * (above - below) / 2e-4
+    return inliers, square, slope
 
 
 @njit(cache=True)
