@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import FEWEST_POINTS, floor, improve, loss_of
-from ridgefeature.kernels.base import found_terms, smoothed
+from ridgefeature.improve import floor, improve, loss_of
+from ridgefeature.kernels.base import FREE, found_terms, smoothed, softened, solved
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -19,31 +19,75 @@ Array = NDArray[np.float64]
 _LARGEST = 0.5
 """Largest slope of the base at the outer border of a template's flanks."""
 _ROUNDS = 3
-_SURE = 0.1
+_PART = 0.1
 """Part of the allowed chance that one template alone may use up: a march asks many times."""
+_SURE_OF_SCALE = 0.37
+"""Efficiency of the median absolute deviation: degrees of freedom that a point adds to what scale it tells."""
+_UNTOLD = 0.015
+"""Curvature in reciprocal widths that a template may see where its path bends or its sizes change."""
 _KEPT = 0.6
 """What of earlier templates still counts at the next one."""
 _DRIFTS = 10.0 ** np.arange(-10, 0)
 """Tried drifts of the terms: variance a length, in powers of the width."""
 
 
-def terms_of(points: Array, template: Template, settings: Settings) -> tuple[Array, Array]:
-    """The base's terms (3,) that the points of a template's window ask for, and their information (3, 3)."""
-    if len(points) < FEWEST_POINTS:
-        return template.base, np.zeros((3, 3))
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What n windows say of the base under them: terms (n, 3), their information (n, 3, 3), and how many
+    points (n,) told it. The information is zero where a window does not tell."""
+
+    terms: Array
+    information: Array
+    points: Array
+
+    @property
+    def mean(self) -> Array:
+        """(3,) weighted by information; zeros where that is not enough."""
+        whole = self.information.sum(axis=0)
+        pull = np.einsum("nij,nj->i", self.information, self.terms)
+        return solved(whole, pull)
+
+    def significant(self, chance: float) -> bool:
+        """Whether the terms differ from zero by more than chance: their mean, or all together.
+
+        Two likelihood ratio tests that share the chance between them. The noise is known from the same
+        points, so the ratios are those of Student's distribution.
+        """
+        if chance >= 0.5:
+            return False
+        known = _SURE_OF_SCALE * np.maximum(self.points - FREE, 1.0)
+        mean = self.mean
+        of_mean = float(mean @ self.information.sum(axis=0) @ mean)
+        each = np.einsum("ni,nij,nj->n", self.terms, self.information, self.terms)
+        total, whole = float((known * np.log1p(each / known)).sum()), float(known.sum())
+        told = int((each > 0).sum())
+        return told > 0 and (
+            whole * np.log1p(of_mean / whole) > _chi_square(3, 0.5 * chance)
+            or total > _chi_square(3 * told, 0.5 * chance)
+        )
+
+
+def terms_of(points: Array, template: Template, settings: Settings) -> Found:
+    """What the points in a template's window, in its frame, say of its base."""
     step, information, _ = found_terms(points, *template.shape, floor(template), *loss_of(settings))
     most = _LARGEST / template.half_breadth
-    return np.minimum(np.maximum(template.base + step, -most), most), information
+    terms = np.minimum(np.maximum(template.base + step, -most), most)
+    return Found(terms[None], information[None], np.array([float(len(points))]))
+
+
+def _roughly(found: Found, width: float) -> Found:
+    """The same, less sure: a template alone knows no bend of its path and no slopes of height and width."""
+    return replace(found, information=np.array([softened(i, (_UNTOLD / width) ** 2) for i in found.information]))
 
 
 def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
     """The start improved on a base as curved as its window says; None where that says nothing of it."""
     fitted = start
     for _ in range(_ROUNDS):
-        terms, information = terms_of(window(fitted), fitted, settings)
-        if not significant(terms[None], information[None], _SURE * settings.base_chance):
+        found = _roughly(terms_of(window(fitted), fitted, settings), fitted.width)
+        if not found.significant(_PART * settings.base_chance):
             return None
-        fitted = improve(window, fitted.changed(base=terms), settings)
+        fitted = improve(window, fitted.changed(base=found.mean), settings)
         if fitted.status in ("failed", "no data"):
             return None
     return fitted
@@ -54,38 +98,21 @@ class Ahead:
     """What a march knows of the base ahead, from the templates behind; it forgets as it goes on."""
 
     settings: Settings
-    information: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    pull: Array = field(default_factory=lambda: np.zeros(3))
+    found: Found = field(default_factory=lambda: Found(np.zeros((1, 3)), np.zeros((1, 3, 3)), np.zeros(1)))
 
     def add(self, window: Window, template: Template) -> Template:
         """Learn from a fitted template; it is returned with the terms that are now expected of the base."""
-        terms, information = terms_of(window(template), template, self.settings)
-        self.information = _KEPT * self.information + information
-        self.pull = _KEPT * self.pull + information @ terms
-        if not np.linalg.matrix_rank(self.information) == 3:
-            return template
-        mean = np.linalg.solve(self.information, self.pull)
-        if significant(mean[None], self.information[None], _SURE * self.settings.base_chance):
-            return template.changed(base=mean)
+        new = _roughly(terms_of(window(template), template, self.settings), template.width)
+        old = replace(self.found, information=_KEPT * self.found.information, points=_KEPT * self.found.points)
+        both = Found(*(np.concatenate(pair) for pair in zip(vars(old).values(), vars(new).values(), strict=True)))
+        self.found = Found(
+            both.mean[None],
+            both.information.sum(axis=0, keepdims=True),
+            both.points.sum(keepdims=True),
+        )
+        if self.found.significant(_PART * self.settings.base_chance):
+            return template.changed(base=both.mean)
         return template.changed(base=np.zeros(3)) if template.base.any() else template
-
-
-def significant(terms: Array, information: Array, chance: float) -> bool:
-    """Whether terms (n, 3) differ from zero by more than chance: their mean along the chain, or all together.
-
-    information (n, 3, 3) is that of the terms, zero where nothing is known of them. Two chi-square tests that
-    share the chance between them.
-    """
-    if chance >= 0.5:
-        return False
-    whole = information.sum(axis=0)
-    pull = np.einsum("nij,nj->i", information, terms)
-    if not np.linalg.matrix_rank(whole) == 3:
-        return False
-    of_mean = float(pull @ np.linalg.solve(whole, pull))
-    of_all = float(np.einsum("ni,nij,nj", terms, information, terms))
-    told = int((information[:, 0, 0] > 0).sum())
-    return of_mean > _chi_square(3, 0.5 * chance) or of_all > _chi_square(3 * told, 0.5 * chance)
 
 
 def _chi_square(degrees: int, chance: float) -> float:
@@ -94,15 +121,12 @@ def _chi_square(degrees: int, chance: float) -> float:
     return degrees * (1.0 - share + NormalDist().inv_cdf(1.0 - chance) * share**0.5) ** 3
 
 
-def curved(templates: tuple[Template, ...], terms: Array, information: Array) -> tuple[Template, ...]:
-    """The templates with the terms of their base (n, 3) smoothed along the chain, as much as is most likely.
-
-    information (n, 3, 3): that of the terms.
-    """
+def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...]:
+    """The templates with the terms of their base smoothed along the chain, as much as is most likely."""
     steps = np.linalg.norm(np.diff([t.position for t in templates], axis=0), axis=1)
     at = np.concatenate([[0.0], np.cumsum(steps)])
     width = float(np.median([t.width for t in templates]))
-    tried = [smoothed(at, terms, information, drift / width**3) for drift in _DRIFTS]
+    tried = [smoothed(at, found.terms, found.information, drift / width**3) for drift in _DRIFTS]
     smooth, variance, _ = max(tried, key=lambda fit: fit[2])
     std = np.sqrt(np.maximum(variance, 0.0))
     return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))

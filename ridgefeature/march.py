@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvature import Ahead
+from ridgefeature.curvature import Ahead, Found
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
 from ridgefeature.kernels import chain as kernel
 from ridgefeature.kernels.base import flattened, standing
@@ -45,8 +45,8 @@ class Track:
     stop: tuple[str, str]
     misfit: Array | None = None
     """(2, m) number and sum of residuals by distance from the spine, once the track is settled."""
-    base: tuple[Array, Array] | None = None
-    """Curvature terms of the base (n, 3) that each window asks for and their information (n, 3, 3), then."""
+    base: Found | None = None
+    """What the windows say of the base's curvature, then."""
 
 
 def reverse(template: Template) -> Template:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvature import curved, significant, terms_of
+from ridgefeature.curvature import Found, curved, terms_of
 from ridgefeature.ends import place_ends, trends
 from ridgefeature.improve import Limits, judge, limits_of, refine
 from ridgefeature.kernels import appraise
@@ -37,22 +37,22 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     settings = settings.marching()
     bins = np.zeros((2, _BINS))
     judged = []
-    terms, information = np.zeros((len(known), 3)), np.zeros((len(known), 3, 3))
+    base = Found(np.zeros((len(known), 3)), np.zeros((len(known), 3, 3)), np.zeros(len(known)))
     for i in range(len(known)):
         new, points = _refit(window, known, i, settings)
         appraise.add_misfit(bins, points, *new.shape, misfit_scale(new))
-        if len(points):
-            terms[i], information[i] = terms_of(points, new, settings)
+        one = terms_of(points, new, settings)
+        base.terms[i], base.information[i], base.points[i] = one.terms[0], one.information[0], one.points[0]
         judged.append(new)
-    return Track(tuple(judged), track.stop, bins, (terms, information))
+    return Track(tuple(judged), track.stop, bins, base)
 
 
 def settle_base(window: Window, track: Track, settings: Settings) -> Track:
     """The settled track settled again on a curved base, where it is one beyond chance, until that stays."""
     for _ in range(_BASE_ROUNDS):
         before = track.templates
-        if track.base is not None and significant(*track.base, settings.base_chance):
-            known = curved(before, *track.base)
+        if track.base is not None and track.base.significant(settings.base_chance):
+            known = curved(before, track.base)
         elif any(t.base.any() for t in before):
             known = tuple(t.changed(base=np.zeros(3), base_std=np.zeros(3)) for t in before)
         else:

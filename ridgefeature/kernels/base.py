@@ -19,8 +19,9 @@ from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split
 
 Floats = NDArray[np.float64]
 _PLACED, _MODES = 5, 4
-_FREE = _PLACED + 3 + _MODES
-_ROWS = _FREE + 2
+FREE = _PLACED + 3 + _MODES
+"""Parameters of which the terms are three."""
+_ROWS = FREE + 2
 _SCORED = 8
 _SAME_SCALE = 0.03
 
@@ -107,7 +108,7 @@ def _all_rows(
         )
         out[0, i], out[1, i] = -r_y, -r_z
         out[2, i], out[3, i], out[4, i] = r_y * z - r_z * y, r_z * x - r_x * z, r_x * y - r_y * x
-        out[_FREE, i], out[_FREE + 1, i] = r_h, r_w
+        out[FREE, i], out[FREE + 1, i] = r_h, r_w
         # Height over the base falls, and with the normal the foot of what stands on it moves. Its height is
         # that of the section: the point's own noise would pull the terms one way.
         stands = z - r[i] / r_z
@@ -161,7 +162,7 @@ def found_terms(
     if n < 2 * _ROWS:
         return step, information, effect
     r, rows = _all_rows(points, height, width, trend, table)
-    left, inside, psi, change = r.copy(), np.empty(n), np.empty(n), np.zeros(_FREE)
+    left, inside, psi, change = r.copy(), np.empty(n), np.empty(n), np.zeros(FREE)
     gram, factor = np.empty((_ROWS, _ROWS)), 0.0
     scale = max(1.4826 * np.median(np.abs(r)), floor)
     for _ in range(_SCORED):
@@ -169,21 +170,21 @@ def found_terms(
         if inliers <= _ROWS or not slope > 0.0:
             return step, information, effect
         gram = _gram(rows, inside)
-        factor = square * inliers * inliers / (slope * slope * (inliers - _FREE))
-        right = np.empty(_FREE)
-        for j in range(_FREE):
+        factor = square * inliers * inliers / (slope * slope * (inliers - FREE))
+        right = np.empty(FREE)
+        for j in range(FREE):
             right[j] = -(rows[j] * psi).sum() * scale * inliers / slope
-        if not solve_in_place(gram[:_FREE, :_FREE].copy(), right):
+        if not solve_in_place(gram[:FREE, :FREE].copy(), right):
             return step, information, effect
         change += right
-        for j in range(_FREE):
+        for j in range(FREE):
             left += right[j] * rows[j]
         before = scale
-        scale = max(1.4826 * np.median(np.abs(left)) / math.sqrt(1.0 - _FREE / n), floor)
+        scale = max(1.4826 * np.median(np.abs(left)) / math.sqrt(1.0 - FREE / n), floor)
         if abs(scale - before) < _SAME_SCALE * before:
             break
     step[:] = change[_PLACED : _PLACED + 3]
-    information = _inverse(_block_of_inverse(gram[:_FREE, :_FREE]) * (scale * scale * factor))
+    information = _inverse(_block_of_inverse(gram[:FREE, :FREE]) * (scale * scale * factor))
     return step, information, _effect(gram)
 
 
@@ -220,7 +221,7 @@ def _block_of_inverse(gram: Floats) -> Floats:
 @njit(cache=True)
 def _effect(gram: Floats) -> Floats:
     """Derivatives (2, 3) of height and width by the terms, where placement and both are fitted."""
-    fitted = np.array([0, 1, 2, 3, 4, _FREE, _FREE + 1])
+    fitted = np.array([0, 1, 2, 3, 4, FREE, FREE + 1])
     normal, out = np.empty((7, 7)), np.zeros((2, 3))
     for j in range(7):
         for k in range(7):
@@ -245,6 +246,21 @@ def _inverse(a: Floats) -> Floats:
             return np.zeros((3, 3))
         out[:, j] = column
     return 0.5 * (out + out.T)
+
+
+@njit(cache=True)
+def solved(a: Floats, b: Floats) -> Floats:
+    """x (3,) with a x = b, a symmetric positive definite (3, 3); zeros where it is none."""
+    return _times(_inverse(a), b)
+
+
+@njit(cache=True)
+def softened(information: Floats, variance: float) -> Floats:
+    """The information (3, 3) of terms to whose covariance so much is added."""
+    covariance = _inverse(information)
+    if covariance.any():
+        covariance += variance * np.eye(3)
+    return _inverse(covariance)
 
 
 @njit(cache=True)
