@@ -165,7 +165,8 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
     if factor == 1:
         return ridge
     names = ("arc_length", "spine", "height", "width", "height_std", "width_std", "border")
-    return replace(ridge, unit="mm", **{name: factor * getattr(ridge, name) for name in names})
+    scaled = {name: factor * getattr(ridge, name) for name in names}
+    return replace(ridge, unit="mm", curvature=ridge.curvature / factor, **scaled)
 
 
 def _room(ridge: Ridge) -> NDArray[np.float64]:

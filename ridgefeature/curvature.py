@@ -1,4 +1,4 @@
-"""How curved the base is under a chain of templates: found, smoothed along it, and zero unless significant."""
+"""How curved the base is under a chain of templates: found, smoothed along it, zero unless significant."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import floor, improve, loss_of
-from ridgefeature.kernels.base import FREE, found_terms, smoothed, softened, solved
+from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -22,7 +22,7 @@ _ROUNDS = 3
 _PART = 0.1
 """Part of the allowed chance that one template alone may use up: a march asks many times."""
 _SURE_OF_SCALE = 0.37
-"""Efficiency of the median absolute deviation: degrees of freedom that a point adds to what scale it tells."""
+"""Efficiency of the median absolute deviation: degrees of freedom of the scale a point."""
 _UNTOLD = 0.015
 """Curvature in reciprocal widths that a template may see where its path bends or its sizes change."""
 _KEPT = 0.6
@@ -77,7 +77,9 @@ def terms_of(points: Array, template: Template, settings: Settings) -> Found:
 
 def _roughly(found: Found, width: float) -> Found:
     """The same, less sure: a template alone knows no bend of its path and no slopes of height and width."""
-    return replace(found, information=np.array([softened(i, (_UNTOLD / width) ** 2) for i in found.information]))
+    return replace(
+        found, information=np.array([softened(i, (_UNTOLD / width) ** 2) for i in found.information])
+    )
 
 
 def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
@@ -103,8 +105,12 @@ class Ahead:
     def add(self, window: Window, template: Template) -> Template:
         """Learn from a fitted template; it is returned with the terms that are now expected of the base."""
         new = _roughly(terms_of(window(template), template, self.settings), template.width)
-        old = replace(self.found, information=_KEPT * self.found.information, points=_KEPT * self.found.points)
-        both = Found(*(np.concatenate(pair) for pair in zip(vars(old).values(), vars(new).values(), strict=True)))
+        old = replace(
+            self.found, information=_KEPT * self.found.information, points=_KEPT * self.found.points
+        )
+        both = Found(
+            *(np.concatenate(pair) for pair in zip(vars(old).values(), vars(new).values(), strict=True))
+        )
         self.found = Found(
             both.mean[None],
             both.information.sum(axis=0, keepdims=True),

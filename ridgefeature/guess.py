@@ -138,7 +138,10 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
     """The start improved on a flat base, or on a curved one where that is told and explains more a point."""
     flat = improve(window, start, settings)
     curved = improve_on_base(window, start, settings)
-    if curved is None or _score(window, curved, pick) * flat.points <= _score(window, flat, pick) * curved.points:
+    if (
+        curved is None
+        or _score(window, curved, pick) * flat.points <= _score(window, flat, pick) * curved.points
+    ):
         return flat
     return curved
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels import appraise, residual
 from ridgefeature.kernels.algebra import moved
-from ridgefeature.kernels.base import found_terms, on_base, standing
+from ridgefeature.kernels.base import on_base, standing
+from ridgefeature.kernels.base_terms import found_terms
 from ridgefeature.kernels.evidence import assess
 from ridgefeature.kernels.fit import bounds, fit
 from ridgefeature.kernels.objective import objective
@@ -160,7 +161,7 @@ def _moved(template: Template, transform: Array, q: Array) -> Template:
 
 
 def _standing(template: Template, position: Array, rotation: Array, height: float, width: float) -> Template:
-    """The template after a fit, which on a curved base saw that as flat: its frame goes along with the base."""
+    """The template after a fit, which saw its base as flat: on a curved one the frame goes along with it."""
     if template.base.any():
         old = template.rotation
         place, axes = standing(old.T @ (position - template.position), old.T @ rotation, template.base)

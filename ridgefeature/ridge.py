@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.base import Base
+from ridgefeature.base import Base, RuledBase, registered_base
 from ridgefeature.bspline import Surface
 from ridgefeature.fitting import stretched
 from ridgefeature.merge import LEAST_BORDER, along, merged_surface
@@ -45,6 +45,7 @@ class Ridge(Stations):
     source: Source | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for f in fields(Stations):
             array = getattr(self, f.name)
             if array.flags.writeable:
@@ -68,7 +69,14 @@ class Ridge(Stations):
         return float(self.arc_length[-1])
 
     @cached_property
+    def _base(self) -> RuledBase:
+        """What it was registered on. A resized ridge has the same, whose rows and columns are then known."""
+        return registered_base(self)
+
+    @cached_property
     def _surface(self) -> Surface:
+        if self.curvature.any():
+            return surface_on(self._base, self, self.section)
         return merged_surface(
             self.arc_length,
             self.spine,
@@ -84,9 +92,10 @@ class Ridge(Stations):
         """The finished surface, C2 and bicubic: u is arc length, v the distance from the spine in widths.
 
         On a base (see ridgefeature.base), the ridge stands on that: the spine and both feet lie on it, and
-        heights are along its normals. Poles depend on base and stations alone; for the same stations they
-        are affine in height, without a base in width, too. Raises ValueError for a base of another length,
-        for which `stretched` fits the ridge, or one that gives no finite points.
+        heights are along its normals. Without one it stands on the base it was registered on. Poles depend on
+        base and stations alone; for the same stations they are affine in height, on a registered base that is
+        flat across in width, too. Raises ValueError for a base of another length, for which `stretched` fits
+        the ridge, or one that gives no finite points.
         """
         return self._surface if base is None else surface_on(base, self, self.section)
 
@@ -131,13 +140,15 @@ class Ridge(Stations):
                 f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet "
                 f"stay on the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
             )
-        return replace(
+        ridge = replace(
             self,
             height=new_height,
             width=new_width,
             height_std=_times(self.height_std, np.abs(height_rate)),
             width_std=_times(self.width_std, width_rate),
         )
+        ridge.__dict__["_base"] = self._base
+        return ridge
 
     def _changed(
         self,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix
 from ridgefeature.bspline import Curve
-from ridgefeature.kernels.base import on_base
+from ridgefeature.kernels.base import on_base, standing
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -41,6 +41,12 @@ class Stations:
     """(k,) one standard deviation, as those of the height."""
     border: Array
     """(k,) distance of the flanks' outer borders from the spine; a change of h or w does not move them."""
+    curvature: Array = field(default_factory=lambda: np.empty(0), kw_only=True)
+    """(k,) of the base across the path, positive where it rises to both sides; zeros if not given."""
+
+    def __post_init__(self) -> None:
+        if not self.curvature.size:
+            object.__setattr__(self, "curvature", np.zeros(len(self.arc_length)))
 
 
 def interpolating_curve(sites: Array, points: Array) -> Curve:
@@ -74,6 +80,14 @@ def _on_path(template: Template, x: float) -> Array:
     return template.position + template.rotation @ place
 
 
+def _normal(template: Template, part: float) -> Array:
+    """Normal of the base so many lengths along the template."""
+    if not template.base.any():
+        return template.rotation[:, 2]
+    place = np.array([part * template.length, 0.0, 0.0])
+    return np.asarray(template.rotation @ standing(place, np.eye(3), template.base)[1][:, 2])
+
+
 def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     """Stations of a chain of fitted templates.
 
@@ -100,7 +114,7 @@ def lay_out(templates: tuple[Template, ...], settings: Settings) -> Stations:
     at = np.interp(parameters[1:-1], fine, lengths)
     tangent = _unit(path(t, 1))
     ends = np.concatenate([[0.0], at, [total]])
-    up = np.array([first.rotation[:, 2], *(q.rotation[:, 2] for q in templates), last.rotation[:, 2]])
+    up = np.array([_normal(first, -0.5), *(q.rotation[:, 2] for q in templates), _normal(last, 0.5)])
     normal = natural_spline_matrix(ends, s) @ up
     normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
     return Stations(
@@ -129,4 +143,5 @@ def _sizes(templates: tuple[Template, ...], at: Array, s: Array, settings: Setti
         "height_std": height_std,
         "width_std": width_std,
         "border": border,
+        "curvature": natural_spline_matrix(at, np.clip(s, at[0], at[-1])) @ [q.base[2] for q in templates],
     }

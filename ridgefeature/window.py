@@ -76,9 +76,7 @@ class Window:
             return self._flattened(template, low, high, half_y, half_z)
         return self._inside((template.position, template.rotation, low, high, half_y, half_z))
 
-    def _flattened(
-        self, template: Template, low: float, high: float, half_y: float, half_z: float
-    ) -> Array:
+    def _flattened(self, template: Template, low: float, high: float, half_y: float, half_z: float) -> Array:
         """The points of the window over a curved base, which is as large within the base."""
         xx, xy, yy = np.abs(template.base)
         far = max(-low, high)
