@@ -31,8 +31,9 @@ def _height(x: float, y: float, terms: Floats) -> tuple[float, float, float]:
 def _bowed(x: float, y: float, terms: Floats) -> tuple[float, float]:
     """How much arc length and distance on the base exceed x and y, to third order."""
     xx, xy, yy = terms[0], terms[1], terms[2]
-    along = xx * x * (xx * x * x / 6.0 + 0.5 * xy * x * y + 0.5 * yy * y * y)
-    across = y * (yy * yy * y * y / 6.0 + 0.5 * xy * yy * x * y + 0.5 * xy * xy * x * x)
+    cubes = xx * x * x * x, x * x * y, x * y * y, yy * y * y * y
+    along = (xx * cubes[0] + xy * cubes[3]) / 6.0 + 0.5 * xx * (xy * cubes[1] + yy * cubes[2])
+    across = (xy * cubes[0] + yy * cubes[3]) / 6.0 + 0.5 * xy * (xy * cubes[1] + yy * cubes[2])
     return along, across
 
 
