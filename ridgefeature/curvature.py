@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import floor, improve, loss_of
 from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
+from ridgefeature.kernels.evidence import explained
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -17,7 +18,7 @@ from ridgefeature.window import Window
 Array = NDArray[np.float64]
 
 _LARGEST = 0.5
-"""Largest slope of the base at the outer border of a template's flanks."""
+"""Slope of the base at the outer border of a template's flanks beyond which it is something else."""
 _ROUNDS = 3
 _PART = 0.1
 """Part of the allowed chance that one template alone may use up: a march asks many times."""
@@ -70,8 +71,9 @@ class Found:
 def terms_of(points: Array, template: Template, settings: Settings) -> Found:
     """What the points in a template's window, in its frame, say of its base."""
     step, information, _ = found_terms(points, *template.shape, floor(template), *loss_of(settings))
-    most = _LARGEST / template.half_breadth
-    terms = np.minimum(np.maximum(template.base + step, -most), most)
+    terms = template.base + step
+    if np.abs(terms).max() * template.half_breadth > _LARGEST:
+        terms, information = template.base, np.zeros((3, 3))
     return Found(terms[None], information[None], np.array([float(len(points))]))
 
 
@@ -116,9 +118,20 @@ class Ahead:
             both.information.sum(axis=0, keepdims=True),
             both.points.sum(keepdims=True),
         )
-        if self.found.significant(_PART * self.settings.base_chance):
+        if not self.found.significant(_PART * self.settings.base_chance):
+            return template.changed(base=np.zeros(3)) if template.base.any() else template
+        if template.base.any():
             return template.changed(base=both.mean)
-        return template.changed(base=np.zeros(3)) if template.base.any() else template
+        # A curved base that shall explain a template for the first time must do so better than a flat one.
+        bent = improve(window, template.changed(base=both.mean), self.settings)
+        return bent if _better(window, bent, template) else template
+
+
+def _better(window: Window, template: Template, other: Template) -> bool:
+    """Whether a template is about as wide as another of the same ridge, and leaves less unexplained."""
+    if template.status in ("failed", "no data") or not 0.5 < template.width / other.width < 2.0:
+        return False
+    return bool(explained(window(template), *template.shape) > explained(window(other), *other.shape))
 
 
 def _chi_square(degrees: int, chance: float) -> float:

@@ -330,8 +330,11 @@ def test_height_and_width_are_those_of_the_ridge_whatever_the_base(name, rate):
     assert np.sqrt(np.mean(h_std**2)) < 2
     assert np.sqrt(np.mean(w_std**2)) < 2
     terms = np.median([t.base for t in ridge.templates], axis=0)
-    np.testing.assert_allclose(terms * rate * W, np.array(BASES[name][1]) * [1, np.sign(terms[1]) or 1, 1] * (
-        [1, np.sign(BASES[name][1][1]) or 1, 1]), atol=0.1 * rate / 3)
+    np.testing.assert_allclose(
+        terms * rate * W,
+        np.array(BASES[name][1]) * [1, np.sign(terms[1]) or 1, 1] * ([1, np.sign(BASES[name][1][1]) or 1, 1]),
+        atol=0.1 * rate / 3,
+    )
 
 
 def test_errors_are_as_large_as_their_standard_deviations():
