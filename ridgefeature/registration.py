@@ -117,7 +117,7 @@ def _track(
     templates = tuple(with_section(t, section) for t in track.templates)
     # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
     track = settle(full, settle(full, Track(templates, track.stop), settings), settings)
-    return finish_ends(full, track, settings)
+    return finish_ends(full, settle_base(full, track, settings), settings)
 
 
 def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:
