@@ -85,12 +85,12 @@ def _roughly(found: Found, width: float) -> Found:
 
 
 def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
-    """The start improved on a base as curved as its window says; None where that says nothing of it."""
+    """The start improved on a base as curved as its window says; None where that says nothing of it at first."""
     fitted = start
     for _ in range(_ROUNDS):
         found = _roughly(terms_of(window(fitted), fitted, settings), fitted.width)
         if not found.significant(_PART * settings.base_chance):
-            return None
+            return None if fitted is start else fitted
         fitted = improve(window, fitted.changed(base=found.mean), settings)
         if fitted.status in ("failed", "no data"):
             return None

@@ -131,7 +131,7 @@ def guess(
     if best is None or best[0] <= 0:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
-    return improve(window, sized(best[1], settings), settings)
+    return _fitted(window, sized(best[1], settings), pick, settings)
 
 
 def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:

@@ -221,7 +221,9 @@ def test_a_wrong_section_is_not_taken_for_a_curved_base():
 
 
 def test_points_that_do_not_tell_give_no_information():
-    for points in (window(n=10), window(n=200) * [0, 1, 1], np.empty((0, 3))):
+    whole = window()
+    one_flank, no_flank = whole[whole[:, 1] < 0.4 * W], whole[np.abs(whole[:, 1]) < 0.4 * W]
+    for points in (window(n=10), window(n=200) * [0, 1, 1], np.empty((0, 3)), one_flank, no_flank):
         step, information, _ = asked(points)
         assert not information.any()
         assert not step.any()

@@ -21,6 +21,8 @@ FREE = _PLACED + 3 + _MODES
 """Parameters of which the terms are three."""
 _ROWS = FREE + 2
 _SCORED = 8
+_LEAST_FLANK = 0.05
+"""Share of the points that must lie on either flank: without one, its tilt is not told from curvature."""
 _SAME_SCALE = 0.03
 
 
@@ -71,6 +73,16 @@ def _gram(rows: Floats, weights: Floats) -> Floats:
     return out
 
 
+@njit(cache=True)
+def _flanked(points: Floats, width: float) -> bool:
+    """Whether both flanks are seen."""
+    left = right = 0
+    for i in range(points.shape[0]):
+        left += points[i, 1] > 0.5 * width
+        right += points[i, 1] < -0.5 * width
+    return min(left, right) > _LEAST_FLANK * points.shape[0]
+
+
 @njit(**OPTIONS)
 def found_terms(
     points: Floats,
@@ -91,7 +103,7 @@ def found_terms(
     """
     step, information, effect = np.zeros(3), np.zeros((3, 3)), np.zeros((2, 3))
     n = points.shape[0]
-    if n < 2 * _ROWS:
+    if n < 2 * _ROWS or not _flanked(points, width):
         return step, information, effect
     r, rows = _all_rows(points, height, width, trend, table)
     left, inside, psi, change = r.copy(), np.empty(n), np.empty(n), np.zeros(FREE)
