@@ -85,7 +85,7 @@ def _roughly(found: Found, width: float) -> Found:
 
 
 def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
-    """The start improved on a base as curved as its window says; None where that says nothing of it at first."""
+    """The start improved on a base as curved as its window says; None where that says nothing of it."""
     fitted = start
     for _ in range(_ROUNDS):
         found = _roughly(terms_of(window(fitted), fitted, settings), fitted.width)
