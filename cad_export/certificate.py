@@ -87,7 +87,7 @@ class Change:
         The host's other faces are the same before and after, so their part cancels and is left out.
         """
         got, ground = 0.0, self.ground or ground_under(self.base)
-        for accuracy in INTEGRATION[0 if self.rough else 1 :]:
+        for accuracy in INTEGRATION[0 if self.rough else 2 :]:
             if accuracy not in ground.measured:
                 fine = accuracy or _GROUND
                 before = sum(_cone(f, ground.near, fine) for f in self.old)

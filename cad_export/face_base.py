@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
 from cad_export.face_path import FacePath, developed_path, follow, nearest, projected_path, settled
+from cad_export.flanks import narrowed
 from cad_export.geometry import topods
 from cad_export.host_surface import Host, host_of
-from cad_export.strip import check_strip, inner_point, longer_direction
+from cad_export.strip import check_strip, inner_point, longer_direction, samples_of
 from ridgefeature.base import developed
 from ridgefeature.fitting import joined, mirrored
 from ridgefeature.merge import along
@@ -42,6 +43,8 @@ class FaceBase:
     reach: tuple[Floats, Floats]
     """Arc lengths (k,) and breadths (k,) of the strip to either side, for which polynomials are made."""
     kept: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
+    slim: bool = False
+    """Whether the flanks were narrowed."""
 
     @property
     def length(self) -> float:
@@ -143,6 +146,8 @@ def face_base(
     fit: str = "length",
     mirror: bool = False,
     reverse: bool = False,
+    w: float | None = None,
+    beyond: bool = False,
 ) -> tuple[FaceBase, Ridge]:
     """The base of a host face along a path, and the ridge fitted to it: on that stands ridge.surface(base).
 
@@ -156,10 +161,33 @@ def face_base(
     Ridge.stretched: "length" stretches the ridge to the path, "scale" scales it too, "trim" keeps it, cut
     where the path is shorter; a longer path is used up to the ridge's length. A closed path gives a closed
     base, on which the ridge's ends are blended into each other.
+    w: rate of width that the ridge will have at most; given, its flanks are narrowed where path or face would
+    fold them, but not the feet's own (see flanks.narrowed).
     mirror: what lay to the left of the ridge's path lies to its right. reverse: the ridge runs the other way.
+    beyond: the strip may leave the face over its outline, along the face's surface.
     Raises ValueError, in words, where the strip of the ridge's borders leaves the face, lies on a hole of it,
     folds in a bend, or overlaps itself; for a path or `at` off the face, corners, no length, no direction.
     """
+    base, fitted = laid(face, ridge, path, at, direction, fit, mirror, reverse)
+    strip = samples_of(base)
+    if w is not None and (slim := narrowed(strip, fitted, w)) is not fitted:
+        base, fitted = replace(base, reach=(slim.arc_length, slim.border), kept={}, slim=True), slim
+        strip = samples_of(base)
+    check_strip(base, strip, beyond)
+    return base, fitted
+
+
+def laid(
+    face: Any,
+    ridge: Ridge,
+    path: Any = None,
+    at: Any = None,
+    direction: Any = None,
+    fit: str = "length",
+    mirror: bool = False,
+    reverse: bool = False,
+) -> tuple[FaceBase, Ridge]:
+    """face_base, without a look at whether the strip fits: it may fold, overlap itself or leave the face."""
     host = host_of(_face(face))
     if not isinstance(ridge, Ridge):
         raise ValueError(f"ridge: expected a Ridge, got {type(ridge).__name__}; register or load one first")
@@ -175,9 +203,7 @@ def face_base(
         goal = min(ridge.length, curve.length) if fit == "trim" else curve.length
         fitted, curve = fitted.stretched(goal, fit), curve.cut(goal)
         fitted = joined(fitted) if curve.closed else fitted
-    base = FaceBase(host, curve, (fitted.arc_length, fitted.border))
-    check_strip(base)
-    return base, fitted
+    return FaceBase(host, curve, (fitted.arc_length, fitted.border)), fitted
 
 
 def _face(shape: Any) -> TopoDS_Face:

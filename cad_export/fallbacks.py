@@ -46,7 +46,7 @@ def fallback(host: TopoDS_Shape, site: Site, h: float, check: bool = True) -> tu
     neither can be right.
     """
     try:
-        change = split_inset(host, site, h)
+        change = split_inset(host, site, h, rough=not check)
         certify(change, thorough=check)
         return change, "split seam"
     except SeamError:

@@ -82,12 +82,17 @@ def check_height(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge, h: float = 1
 def _known(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge) -> Headroom:
     known = _KNOWN.setdefault(base, [])
     for other, same, room in known:
-        if same is ridge and other.IsSame(solid):
+        if _alike(same, ridge) and other.IsSame(solid):
             return room
     room = headroom(solid, base, ridge)
     known.append((solid, ridge, room))
     del known[:-_KEPT]
     return room
+
+
+def _alike(a: Ridge, b: Ridge) -> bool:
+    same = a.section is b.section and np.array_equal(a.width, b.width)
+    return same and np.array_equal(a.height, b.height)
 
 
 def headroom(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge) -> Headroom:

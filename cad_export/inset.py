@@ -26,7 +26,7 @@ from OCP.TopoDS import (
 
 from cad_export.certificate import Change, certify
 from cad_export.check import subshapes
-from cad_export.fallbacks import sunk_fuse
+from cad_export.fallbacks import fallback
 from cad_export.inset_edges import Maker
 from cad_export.site import SeamError, Site
 from ridgefeature.bspline import Surface
@@ -39,7 +39,7 @@ _SUNK = 1e-3
 class InsetReport:
     """How a surface was set into a host.
 
-    method: "inset", "turned seam" or "sunk fuse"; volumes and tolerance in the host's unit; volume_added is
+    method: "inset", "split seam" or "sunk fuse"; volumes and tolerance in the host's unit; volume_added is
     measured on the solid, below 0 for a groove; volume_expected is the surface's own integral.
     """
 
@@ -84,7 +84,7 @@ def inset_at(
         certify(change, thorough=check)
     except SeamError:
         surface = site.at(h)
-        change, method = sunk_fuse(host, surface, site.base, check), "sunk fuse"
+        change, method = fallback(host, site, h, check)
         grown = face_with(change.solid, surface, _SUNK * float(np.abs(surface.poles - site.base.poles).max()))
     report = InsetReport(
         method,

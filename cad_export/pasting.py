@@ -5,27 +5,26 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import cadquery as cq
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from cad_export.carried import faces_of, record_of
 from cad_export.check import subshapes
 from cad_export.face_base import FaceBase, face_base, vector
 from cad_export.geometry import topods
-from cad_export.inset import face_of, inset_at
+from cad_export.headroom import check_height
+from cad_export.inset import InsetReport, face_of, inset_at
 from cad_export.paste_history import Placement, remember
 from cad_export.site import Site
-from ridgefeature.base import geodesic_curvature
+from cad_export.strip import OffFaceError
 from ridgefeature.fitting import FITS
-from ridgefeature.merge import LEAST_BORDER
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import millimetres_per
 
@@ -67,8 +66,16 @@ def paste(
         raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
     solid = _solid_of(host)
     chosen = face_of(solid, _face_of(solid, face, path, at))
-    stand = _stand(_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
-    result, grown, told = inset_at(solid, stand.site(h, w), h, check)
+    where = (_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
+    try:
+        stand = _stand(*where)
+        result, grown, told = _set_in(solid, stand, h, w, check)
+    except OffFaceError as error:
+        try:  # other faces may go on from this one
+            stand = _stand(*where, beyond=True)
+            result, grown, told = _set_in(solid, stand, h, w, check)
+        except ValueError:
+            raise error from None
     if report is not None:
         report.update(asdict(told))
     options = {"fit": fit, "scale": scale, "mirror": mirror, "reverse": reverse}
@@ -106,8 +113,6 @@ class _Stand:
         return x, y, z
 
 
-_UNFOLDED = 0.85
-"""Breadth of a flank in radii of the path's bend."""
 _STANDS: OrderedDict[tuple[Any, ...], _Stand] = OrderedDict()
 _KEPT_WIDTHS = 4
 _KEPT = 16
@@ -125,30 +130,50 @@ def _stand(
     mirror: bool,
     reverse: bool,
     w: float,
+    beyond: bool = False,
 ) -> _Stand:
-    """The ridge on the face's base along the path, remembered."""
+    """The ridge on the face's base along the path, remembered: one for all w, unless flanks are narrowed."""
     along = None if path is None else topods(path)
     held = (ridge, face.TShape(), along and along.TShape())
     places = [repr(None if value is None else np.asarray(value).tolist()) for value in (at, direction)]
     locations = [shape and shape.Location().HashCode() for shape in (face, along)]
-    least = min(w, 1.0) if path is None and _is_bent(ridge) else 1.0
-    key = (*map(id, held), face.Orientation(), *locations, *places, fit, scale, mirror, reverse, least)
-    if key not in _STANDS:
-        whole = _in_millimetres(ridge, scale)
-        base, fitted = face_base(
-            face,
-            _narrowed(whole, least) if path is None else whole,
-            path=path,
-            at=at,
-            direction=direction,
-            fit=fit,
-            mirror=mirror,
-            reverse=reverse,
-        )
-        _STANDS[key] = _Stand(held, face, base, fitted)
-        while len(_STANDS) > _KEPT:
-            _STANDS.popitem(last=False)
-    return _STANDS[key]
+    key = (*map(id, held), face.Orientation(), *locations, *places, fit, scale, mirror, reverse, beyond)
+
+    def stand(rate: float) -> _Stand:
+        if (*key, rate) not in _STANDS:
+            base, fitted = face_base(
+                face,
+                _in_millimetres(ridge, scale),
+                path=path,
+                at=at,
+                direction=direction,
+                fit=fit,
+                mirror=mirror,
+                reverse=reverse,
+                w=rate,
+                beyond=beyond,
+            )
+            _STANDS[(*key, rate)] = _Stand(held, face, base, fitted)
+            while len(_STANDS) > _KEPT:
+                _STANDS.popitem(last=False)
+        return _STANDS[(*key, rate)]
+
+    own = isinstance(w, (int, float)) and 0 < w < np.inf and w != 1
+    try:
+        found = stand(1.0)
+    except ValueError:
+        if own and w < 1:  # flanks may be narrower for a narrower ridge
+            return stand(float(w))
+        raise
+    return stand(float(w)) if own and found.base.slim else found
+
+
+def _set_in(
+    solid: TopoDS_Shape, stand: _Stand, h: float, w: float, check: bool
+) -> tuple[TopoDS_Solid, TopoDS_Face, InsetReport]:
+    site = stand.site(h, w)
+    check_height(solid, stand.base, stand.ridge.resized(w=w), h)
+    return inset_at(solid, site, h, check)
 
 
 def _checked(ridge: Any) -> Ridge:
@@ -167,31 +192,6 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
     names = ("arc_length", "spine", "height", "width", "height_std", "width_std", "border")
     scaled = {name: factor * getattr(ridge, name) for name in names}
     return replace(ridge, unit="mm", curvature=ridge.curvature / factor, **scaled)
-
-
-def _room(ridge: Ridge) -> NDArray[np.float64]:
-    """Breadth (k,) that a flank may have without folding over the path's own bends, three stations around."""
-    bend = np.abs(geodesic_curvature(ridge))
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(bend, 3, mode="edge"), 7).max(axis=1)
-    return np.asarray(_UNFOLDED / np.maximum(near, 1e-300), dtype=np.float64)
-
-
-_BENT: WeakKeyDictionary[Ridge, bool] = WeakKeyDictionary()
-
-
-def _is_bent(ridge: Ridge) -> bool:
-    if ridge not in _BENT:  # a Ridge does not change
-        _BENT[ridge] = bool((_room(ridge) < ridge.border).any())
-    return _BENT[ridge]
-
-
-def _narrowed(ridge: Ridge, w: float) -> Ridge:
-    """The ridge with narrower flanks where its own path bends so that they would fold.
-
-    Never narrower than the feet need at the rate w.
-    """
-    least = 1.05 * LEAST_BORDER * ridge.width * max(w, 0.0)
-    return replace(ridge, border=np.minimum(ridge.border, np.maximum(_room(ridge), least)))
 
 
 def _solid_of(host: Any) -> TopoDS_Shape:

@@ -8,7 +8,7 @@ from what remains of their edges. No surface is turned or refitted, and all othe
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,15 +73,22 @@ def _distance(surface: HostSurface, points: Floats) -> float:
     return float(np.linalg.norm(surface.points(uv) - points, axis=1).max())
 
 
-def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
+@lru_cache(maxsize=8)
+def _cut_site(site: Site) -> CutSite:
+    """The same site, kept: what does not depend on the height is worked out once."""
+    return CutSite(site.face, site.surface, site.base)
+
+
+def split_inset(host: TopoDS_Shape, site: Site, h: float, rough: bool = False) -> Change:
     """The host with the surface at height h set into the site's face and others on the same surface.
 
-    host: the solid that holds the face; not altered. The change's first new face is the ridge's. Raises
+    host: the solid that holds the face; not altered. rough: whether the fastest integration of the volume may
+    do. The change's first new face is the ridge's. Raises
     SeamError where the border runs along a seam or over its end; OffFacesError where it leaves these faces;
     ValueError, saying what to change, where it is off the surface, or meets or covers holes and earlier
     ridges.
     """
-    place = CutSite(site.face, site.surface, site.base)
+    place = _cut_site(site)
     place.volume.check(h)
     _check_side(place)
     maker = Maker(place, h)
@@ -99,7 +106,8 @@ def split_inset(host: TopoDS_Shape, site: Site, h: float) -> Change:
     kept = kept_parts(cuts, [x for met in found for x in met], sheet)
     old, ground = _divided(sheet, halves, kept, laid)
     solid = with_faces(host, old, [*new, *ground])
-    return Change(tuple(old), solid, tuple(new), place.base, place.volume.at(h), tuple(ground))
+    expected = place.volume.at(h)
+    return Change(tuple(old), solid, tuple(new), place.base, expected, tuple(ground), place.ground, rough)
 
 
 def _check_side(site: Site) -> None:
@@ -169,7 +177,7 @@ def _laid(
 
     Its edge gets a parameter curve on the face.
     """
-    middle = part.curve(0.5 * (part.span[0] + part.span[1]))[None]
+    middle, is_in_hole = part.curve(0.5 * (part.span[0] + part.span[1]))[None], False
     for k, (face, wires) in enumerate(zip(sheet, own, strict=True)):
         surface = surface_on(face)
         segments = np.concatenate([half.segments for wire in wires for half in wire])
@@ -179,7 +187,9 @@ def _laid(
         for move in _moves(uv[0], segments, surface.periods):
             if inside(uv + move, segments)[0]:
                 return k, _half_on(part, face, uv[0] + move, site)
-    raise OffFacesError(_LEAVES)
+            outline = np.concatenate([half.segments for half in wires[0]])
+            is_in_hole |= bool(inside(uv + move, outline)[0])
+    raise ValueError(_MEETS_HOLE) if is_in_hole else OffFacesError(_LEAVES)
 
 
 def _moves(uv: Floats, segments: Floats, periods: tuple[float, float]) -> list[Floats]:
@@ -196,10 +206,14 @@ def _half_on(part: Stretch, face: TopoDS_Face, at: Floats, site: Site) -> HalfEd
     """A part of the border, its middle at parameters `at`, as a half-edge of the face around the ridge."""
     surface, middle = surface_on(face), 0.5 * (part.span[0] + part.span[1])
     found = on_host(surface, part.curve, part.span, None, part.forward)
-    if not found.distance <= ON_HOST * site.breadth:
-        raise OffFacesError(_LEAVES)
     period = np.array(surface.periods)
     move = period * np.round((at - found.flat(middle)) / np.where(period > 0, period, np.inf))
+    if move.any() and not found.distance <= ON_HOST * site.breadth:
+        # a surface that closes without being periodic has nothing there: begin on its own parameters
+        found = on_host(surface, part.curve, part.span, found.polyline[0] + move, part.forward)
+        move = np.zeros(2)
+    if not found.distance <= ON_HOST * site.breadth:
+        raise OffFacesError(_LEAVES)
     where, build = TopLoc_Location(), BRep_Builder()
     raw = BRep_Tool.Surface_s(face, where)
     flat = curve2d(replace(found.flat, poles=found.flat.poles + move))

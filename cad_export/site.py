@@ -41,7 +41,7 @@ LIFT = 3e-7
 
 
 class SeamError(ValueError):
-    """The footprint runs over a seam of the face."""
+    """The footprint runs over a seam or the outline of the face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,11 +221,13 @@ class Site:
         island = []
         for k, (wire, segments) in enumerate(self.own):
             if cross(around, segments):
+                if k == 0:
+                    raise SeamError(
+                        "surface: expected a border within the face, it leaves the face's outline"
+                    )
                 raise ValueError(
-                    "surface: expected a border within the face, it leaves the face's outline; move the path"
-                    if k == 0
-                    else "surface: expected a border clear of holes and earlier ridges, "
-                    "it overlaps one; move the path"
+                    "surface: expected a border clear of holes and earlier ridges, it overlaps one; "
+                    "move the path"
                 )
             if k and inside(segments[:1, 0], lines[outer])[0]:
                 if len(loops) == 1 or inside(segments[:1, 0], around)[0]:

@@ -108,17 +108,33 @@ def samples_of(base: _Strip) -> Samples:
     return Samples(s, breadth, y, x, points, normal, left, ahead, base.length, base.closed)
 
 
-def check_strip(base: _Strip) -> None:
-    """Raise ValueError where the strip folds, overlaps itself, or is not inside the face."""
-    strip = samples_of(base)
+class OffFaceError(ValueError):
+    """The strip leaves the face over its outline."""
+
+
+def check_strip(base: _Strip, samples: Samples | None = None, beyond: bool = False) -> None:
+    """Raise ValueError where the strip folds, overlaps itself, or is not inside the face.
+
+    beyond: whether it may leave the face over its outline, onto others; else that is an OffFaceError.
+    """
+    strip = samples_of(base) if samples is None else samples
     check_folds(strip)
     check_overlap(strip)
-    check_inside(strip, base.host)
+    try:
+        check_inside(strip, base.host)
+    except OffFaceError:
+        if not beyond:
+            raise
+
+
+def speed_of(strip: Samples) -> Floats:
+    """(n, m): how far one goes along at the samples for a step along the path; below 0 where it folds."""
+    return np.asarray((strip.ahead * np.cross(strip.left, strip.normal)).sum(axis=-1), dtype=np.float64)
 
 
 def check_folds(strip: Samples) -> None:
     """Raise ValueError where the path bends tighter than the strip is broad."""
-    speed = (strip.ahead * np.cross(strip.left, strip.normal)).sum(axis=-1)
+    speed = speed_of(strip)
     i = int(speed.min(axis=1).argmin())
     if speed[i].min() < _LEAST_SPEED:
         raise ValueError(
@@ -188,7 +204,7 @@ def check_inside(strip: Samples, host: Host) -> None:
     advice = "move it by at= or path=, turn it by direction=, or use a smaller ridge"
     if hole:
         raise ValueError(f"expected a strip clear of the face's holes, it meets one near {where}; {advice}")
-    raise ValueError(f"expected a strip inside the face, it leaves the face near {where}; {advice}")
+    raise OffFaceError(f"expected a strip inside the face, it leaves the face near {where}; {advice}")
 
 
 def in_face(face: TopoDS_Face, x: Floats) -> NDArray[np.bool_]:

@@ -93,8 +93,9 @@ def _limits(a: Floats, b: Floats, c: Floats) -> tuple[float, float]:
 def _advice(low: float, high: float) -> str:
     if low == high:
         return "use a path with wider bends"
-    bounds = [f"{word} {h:.3g}" for word, h in (("above", low), ("below", high)) if np.isfinite(h)]
-    return f"stay {' and '.join(bounds)}, or use a path with wider bends"
+    bounds = [f"{word} {h:.3g}" for word, h in (("above", low), ("below", high)) if abs(h) < 100]
+    stay = f"stay {' and '.join(bounds)}, or " if bounds else ""
+    return f"{stay}use a path with wider bends"
 
 
 def _caps(poles: Floats, v: _Nodes) -> list[float]:

@@ -1,14 +1,16 @@
 """A real laser-deposited metal bead, registered in its scan and pasted at three heights on a new plate.
 
-python examples/laser_bead.py [SCANS]
-SCANS, or the environment variable RIDGE_SCANS, is a folder with lmd_bead_kink.npz: `points` (n, 3) in metres
-and `seed`, a point on the left bead. The scan is downsampled.xyz of github.com/openlmd/proper.
+python examples/laser_bead.py [FOLDER]
+The plate is written to FOLDER. The environment variable RIDGE_SCANS names a folder with lmd_bead_kink.npz:
+`points` (n, 3) in metres and `seed`, a point on the left bead. The scan is downsampled.xyz of
+github.com/openlmd/proper.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 import cadquery as cq
@@ -20,8 +22,8 @@ import ridgefeature as rf
 HEIGHTS = (0.5, 1.0, 1.5)
 
 
-def main(file: Path) -> None:
-    with np.load(file) as data:
+def main(scan: Path, folder: Path) -> None:
+    with np.load(scan) as data:
         points, seed = data["points"], data["seed"]
     ridge = rf.register(rf.Scan(points, unit="m"), at=seed)
     millimetres = 1000.0 * np.array(
@@ -41,11 +43,17 @@ def main(file: Path) -> None:
     assert part.isValid() and len(cx.carried_by(part)) == 3
     assert np.allclose(np.divide(added, added[1]), HEIGHTS, rtol=1e-3), added
 
+    file = cx.step(part, folder / "plate.step")
+    print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB, carries {len(cx.load(file))} ridges")
+    assert tuple(carried.h for carried in cx.carried_in(file)) == HEIGHTS
+
 
 if __name__ == "__main__":
-    folder = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("RIDGE_SCANS", "")
-    scan = Path(folder) / "lmd_bead_kink.npz"
-    if folder and scan.is_file():
-        main(scan)
+    scan = Path(os.environ.get("RIDGE_SCANS", ".")) / "lmd_bead_kink.npz"
+    if not scan.is_file():
+        print("skipped: set RIDGE_SCANS to the folder that holds lmd_bead_kink.npz")
+    elif len(sys.argv) > 1:
+        main(scan, Path(sys.argv[1]))
     else:
-        print("skipped: give the folder that holds lmd_bead_kink.npz")
+        with tempfile.TemporaryDirectory() as name:
+            main(scan, Path(name))

@@ -42,9 +42,9 @@ def main(folder: Path) -> None:
     assert error < 0.02, error
     assert part.isValid() and added > 0
 
-    file = cx.write(part, folder / "spiral.brep")
-    volume = cq.Shape.importBrep(str(file)).Volume(1e-6)
-    assert abs(volume / part.Volume(1e-6) - 1) < 1e-9, volume
+    file = cx.step(part, folder / "spiral.step")
+    volume = cq.Shape.cast(cx.read_step(file)).Volume(1e-6)
+    assert abs(volume / part.Volume(1e-6) - 1) < 1e-6, volume
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from ridgefeature.kernels.search import best_straight_ridge, principal_axes
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
+from ridgefeature.verdict import distinct
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ _PAST_BEST = 3
 _FEWEST_TRIES = 2
 _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
+_DISTINCT = 0.1
+"""What one template must have of the evidence that tells a whole ridge from other surfaces."""
 _ANGLES = np.arange(16) * (np.pi / 16)
 _OFFSETS = np.array([-0.3, 0.0, 0.3])
 
@@ -116,22 +119,28 @@ def guess(
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
-    the best first and at least two, until one is clear, and the one that explains most is kept. `extent`,
+    the best first and at least two, until one is clear, and the one that explains most is kept: of those that
+    neither a smooth surface nor an edge explains as well, if there are any. `extent`,
     about the diameter of the scan, bounds the widths. A hinted direction (to 10 degrees) and width leave less
     to try.
     """
-    best: tuple[float, Template] | None = None
+    best: tuple[bool, float, Template] | None = None
     for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
-        if tried >= _FEWEST_TRIES and best is not None and best[0] > _CLEAR:
+        if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
         score = _score(window, fitted, pick)
-        if best is None or score > best[0]:
-            best = score, fitted
-    if best is None or best[0] <= 0:
+        if score <= 0 or fitted.width > settings.widest * extent:
+            continue
+        if best is not None and best[0] and score <= best[1]:
+            continue
+        clear = distinct(window, fitted, settings) >= _DISTINCT * settings.distinct
+        if best is None or (clear, score) > best[:2]:
+            best = clear, score, fitted
+    if best is None:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
-    return _fitted(window, sized(best[1], settings), pick, settings)
+    return _fitted(window, sized(best[2], settings), pick, settings)
 
 
 def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -34,6 +35,13 @@ _HOPELESS = 3.0
 """Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
 """A fit whose noise is this many times that of the last three templates is suspect."""
+_CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
+_CORNER_RADIUS = 0.5
+_CORNER_EVIDENCE = 0.3
+"""Evidence of a template behind a sharp bend, in parts of that of the one before."""
+_USUAL = 5
+_OUTGROWN = 2.5
+"""Width of a template, in parts of the median of the last five, that is another ridge's."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -118,6 +126,12 @@ def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = F
     return ""
 
 
+def _outgrown(fitted: Template, chain: list[Template]) -> str:
+    """Why a template is no part of a ridge as the last ones show it: another, wider rise under it."""
+    usual = statistics.median(t.width for t in chain[-_USUAL:])
+    return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
+
+
 def _meets(template: Template, others: list[Template]) -> bool:
     """Whether a template lies on one of the others."""
     if not others:
@@ -145,13 +159,53 @@ def _fit_next(
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
-    if not found[2].startswith(_FLAT) or chain[-1].evidence > _WEAK * settings.going_on:
+    if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
+        return _round_corner(rough, chain, settings) or found
+    if not found[2].startswith(_FLAT):
         return found
     for known in (chain, _without_last(chain, settings)):
         longer = _fit_best(rough, full, known, append(known, settings, longest=True), gap, settings)
         if not longer[2]:
             return longer
     return found
+
+
+def corners(chain: list[Template], settings: Settings) -> list[Template]:
+    """Starts of the next template behind a sharp bend, 30 to 90 degrees to either side.
+
+    The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on.
+    """
+    last = chain[-1]
+    straight = append(chain[-1:], settings)[0]
+    along, left, up = last.rotation.T
+    found = []
+    for angle in np.radians(_CORNERS):
+        radius = _CORNER_RADIUS * last.width * np.sign(angle)
+        ahead = np.cos(angle) * along + np.sin(angle) * left
+        corner = last.end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
+        axes = np.column_stack([ahead, np.cross(up, ahead), up])
+        found.append(straight.changed(position=corner + 0.5 * straight.length * ahead, rotation=axes))
+    return found
+
+
+def _round_corner(
+    rough: Window, chain: list[Template], settings: Settings
+) -> tuple[Template, Template, str] | None:
+    """The next template behind a sharp bend, where the ridge goes on there beyond doubt."""
+    last = chain[-1]
+    starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, last.scale))
+    for start in starts[:2]:
+        fitted = improve(rough, start, settings)
+        clear = fitted.evidence > max(_CORNER_EVIDENCE * last.evidence, settings.evidence)
+        alike = 0.75 < fitted.width / last.width < 1.33 and 0.6 < fitted.height / last.height < 1.6
+        if (
+            clear
+            and alike
+            and not _reject(fitted, start, settings, gap=True)
+            and not _meets(fitted, chain[:-1])
+        ):
+            return start, fitted, ""
+    return None
 
 
 def _without_last(chain: list[Template], settings: Settings) -> list[Template]:
@@ -176,7 +230,7 @@ def _fit_best(
         if best is not None and i >= len(starts) and best[1].evidence < _HOPELESS:
             break
         fitted = improve(window, start, settings)
-        why = _reject(fitted, start, settings, gap)
+        why = _reject(fitted, start, settings, gap) or _outgrown(fitted, chain)
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
         if fitted.status == "no data" or (not why and fitted.scale < suspect):

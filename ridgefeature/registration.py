@@ -21,6 +21,7 @@ from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
+from ridgefeature.verdict import no_ridge
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -106,6 +107,12 @@ def _track(
     track = place_ends(full, track, settings)
     track = settle_base(full, settle(full, track, settings), settings)
     track = finish_ends(full, track, settings)
+    why = no_ridge(rough, track, pick, extent, settings)
+    if why:
+        raise NoRidgeError(
+            f"no ridge at {_text(pick)}: {why}; pick a point on the ridge, or give direction=, width= and "
+            "height= as a start"
+        )
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )

@@ -173,16 +173,19 @@ def without_offsets(shape: cq.Shape) -> float:
     return volume(ShapeCustom.ConvertToBSpline_s(shape.wrapped, False, False, True, False), 1e-6)
 
 
-def test_a_shell_of_a_part_whose_ridge_runs_out(host, ridge):
-    """Open on the side away from the ridge. On ends that are cut off OCCT mostly fails: they make cusps."""
+def shelled(ridge: rf.Ridge, host: Host, thickness: float) -> None:
+    """Shell a part whose ridge runs out, open on the side away from the ridge; hold volume and shape.
+
+    On ends that are cut off OCCT mostly fails: cap and ridge meet in a cusp at the feet.
+    """
     part = pasted(ridge.resized(height=running_out(ridge)), host)
     hollow, plain = (
-        cq.Workplane(s).faces("<Z").shell(-THICKNESS, kind="intersection").val() for s in (part, host.solid)
+        cq.Workplane(s).faces("<Z").shell(thickness, kind="intersection").val() for s in (part, host.solid)
     )
     checked(hollow)
     walls = without_offsets(plain) + THICKNESS * (part.Area() - host.solid.Area())
     assert without_offsets(hollow) == pytest.approx(walls, rel=2e-4)
-    # within, the wall follows the ridge's own surface
+    # the other side of the wall follows the ridge's own surface
     poles, followed = ridge_surface(part).poles, []
     for face in hollow.Faces():
         geometry = BRep_Tool.Surface_s(face.wrapped)
@@ -190,4 +193,13 @@ def test_a_shell_of_a_part_whose_ridge_runs_out(host, ridge):
             own = from_occt(geometry.BasisSurface()).poles
             if own.shape == poles.shape and np.array_equal(own, poles):
                 followed.append(geometry.Offset())
-    assert followed == [-THICKNESS]
+    assert followed == [thickness]
+
+
+def test_a_shell_inwards(host, ridge):
+    shelled(ridge, host, -THICKNESS)
+
+
+@pytest.mark.parametrize("make", [box, cylinder])  # OCCT cannot shell the spline host outwards by itself
+def test_a_shell_outwards(make, ridge):
+    shelled(ridge, make(), THICKNESS)

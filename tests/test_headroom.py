@@ -105,6 +105,15 @@ def test_the_same_face_on_another_solid_has_its_own_room():
     check_height(thick.wrapped, base, ridge, h=deep)
 
 
+def test_a_wider_or_higher_ridge_on_the_same_base_has_its_own_limits():
+    solid, base, ridge, _ = stood("plate")
+    deep = -0.95 * 10 / TALLEST
+    check_height(solid, base, ridge, h=deep)
+    check_height(solid, base, ridge.resized(w=1.2), h=deep)
+    with pytest.raises(ValueError, match="another part of the host"):
+        check_height(solid, base, ridge.resized(h=1.2), h=deep)
+
+
 def test_a_grooves_own_sign_counts():
     solid, base, ridge, _ = stood("plate")
     groove = ridge.resized(h=-1)

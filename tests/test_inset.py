@@ -200,9 +200,9 @@ def test_an_open_mesh_is_found() -> None:
 
 
 @pytest.mark.parametrize("h", [1.5, -1.0])
-def test_over_a_seam_a_sunk_block_is_fused(h: float) -> None:
+def test_over_a_seam_the_seam_is_split(h: float) -> None:
     host = cylinder().rotate(cq.Vector(0, 0, 0), cq.Vector(1, 0, 0), 180)
     solid, report = inset(host.wrapped, curved_face(host), *carried(h, cylinder_map(20.0)))
-    assert report.method == "sunk fuse"
+    assert report.method == "split seam"
     added = volume(solid, 1e-7) - volume(host.wrapped, 1e-7)
     assert added == pytest.approx(report.volume_expected, rel=1e-3)

@@ -198,9 +198,6 @@ def registers(points: np.ndarray, at) -> bool:
     return True
 
 
-@pytest.mark.xfail(
-    strict=True, reason="4 of 6 spheres of radius 20, noise 0.1, give one template: h 6 to 26, w 18 to 41"
-)
 def test_a_sphere_has_no_ridge():
     found = []
     for seed in range(6):

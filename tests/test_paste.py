@@ -170,3 +170,37 @@ def test_a_ridge_over_an_earlier_one_is_refused(ridge, box):
     part = cx.paste(ridge, box, at=(0, 0, 10), check=False)
     with pytest.raises(ValueError):
         cx.paste(ridge, part, at=(0, 0, 10), direction=(1, 1, 0), check=False)
+
+
+def test_a_ridge_may_run_on_over_faces_that_go_on_from_the_face(ridge):
+    left, right = (cq.Workplane().box(60, 80, 20).translate((x, 0, 0)) for x in (-30, 30))
+    host = left.union(right, clean=False).val()
+    face = cq.Workplane(host).faces(">Z").vals()[0]
+    short, report = ridge.stretched(60.0, "scale"), {}
+    part = cx.paste(short, host, face=face, at=(-10, 0, 10), direction=(1, 0, 0), report=report)
+    whole = cx.paste(
+        short, cq.Solid.makeBox(120, 80, 20, (-60, -40, -10)), at=(-10, 0, 10), direction=(1, 0, 0)
+    )
+    assert report["method"] == "split seam"
+    assert part.Volume(1e-6) == pytest.approx(whole.Volume(1e-6), rel=1e-6)
+    [(grown, _)], [(same, _)] = cx.carried_by(part), cx.carried_by(whole)
+    np.testing.assert_allclose(cx.surface_of(grown).poles, cx.surface_of(same).poles, atol=1e-9)
+
+
+def test_a_ridge_over_an_edge_is_refused(ridge, box, top):
+    with pytest.raises(ValueError, match="leaves the face near"):
+        cx.paste(ridge.stretched(60.0, "scale"), box, face=top, at=(80, 0, 10), direction=(1, 0, 0))
+
+
+def test_a_groove_through_a_plate_is_refused_by_its_depth(ridge):
+    plate = cq.Workplane().box(170, 170, 2).val()
+    with pytest.raises(ValueError, match=r"h: expected at least .* another part of the host"):
+        cx.paste(ridge, plate, face=cq.Workplane(plate).faces(">Z").val(), h=-1, check=False)
+
+
+def test_flanks_are_narrowed_where_a_path_bends_and_the_feet_fit(ridge, box, top):
+    small = ridge.stretched(40.0, "scale")
+    radius = 0.8 * float(small.border.max())
+    circle = cq.Edge.makeCircle(radius, cq.Vector(0, 0, 10))
+    part = cx.paste(small.resized(w=0.5), box, face=top, path=circle, fit="trim", check=False)
+    assert part.isValid() and part.Volume(1e-6) > box.Volume()

@@ -1,0 +1,56 @@
+"""Ridge or no ridge: whether what was found beats a smooth surface, a step and a crease."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ridgefeature.improve import FEWEST_POINTS
+from ridgefeature.kernels.alternatives import advantage
+from ridgefeature.march import GOES_ON, Track
+from ridgefeature.settings import Settings
+from ridgefeature.template import Template
+from ridgefeature.window import Window
+
+_LEAST_CONTRAST = 0.05
+"""Least noise scale, in parts of the height: misfit of the section is no evidence for another surface."""
+
+
+def distinct(window: Window, template: Template, settings: Settings) -> float:
+    """Twice the log likelihood ratio of the ridge against the better of a smooth surface and an edge."""
+    points = window(template)
+    if len(points) < FEWEST_POINTS or template.height == 0:
+        return 0.0
+    scale = max(template.scale, _LEAST_CONTRAST * abs(template.height))
+    return float(
+        min(
+            advantage(
+                points, *template.shape, 0.5 * template.length, template.half_breadth, scale, settings.tuning
+            )
+        )
+    )
+
+
+def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, settings: Settings) -> str:
+    """Why what was found is no ridge; empty if it is one.
+
+    Templates are asked from the pick on until they outweigh chance. A ridge that is found whole must be
+    longer than wide, and none may be as wide as the scan, or a mere fin.
+    """
+    templates = track.templates
+    width = float(np.median([t.width for t in templates]))
+    if width > settings.widest * extent:
+        return f"what rises there is {width:.4g} wide, on a scan of about {extent:.4g}"
+    height = float(np.median([abs(t.height) for t in templates]))
+    if height > settings.steepest * width:
+        return f"what rises there is {height:.4g} high and {width:.4g} wide"
+    whole = not any(why.startswith(GOES_ON) for why in track.stop)
+    length = sum(t.length for t in templates)
+    if whole and length < settings.shortest * width:
+        return f"what rises there is {length:.4g} long and {width:.4g} wide"
+    order = sorted(templates, key=lambda t: float(np.linalg.norm(t.position - pick)))
+    evidence = 0.0
+    for template in order:
+        evidence += distinct(window, template, settings)
+        if evidence >= settings.distinct:
+            return ""
+    return f"a smooth surface or an edge explains it as well (evidence {evidence:.1f})"

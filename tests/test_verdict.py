@@ -1,0 +1,127 @@
+"""Ridge or no ridge: what a smooth surface or an edge explains as well is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import ridgefeature as rf
+from ridgefeature.kernels.alternatives import advantage, powers, robust_loss
+from ridgefeature.section import bell
+from ridgefeature.settings import Settings
+
+FLAT = np.zeros(3)
+
+
+def tukey(r: np.ndarray, tuning: float = 5.0) -> float:
+    q = np.maximum(1 - (r / tuning) ** 2, 0)
+    return float(np.sum(tuning**2 / 6 * (1 - q**3)))
+
+
+@pytest.mark.parametrize("outliers", [0.0, 0.1, 0.2])
+def test_the_robust_loss_is_the_least_that_a_search_finds(outliers: float) -> None:
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(-1, 1, (2, 300))
+    design = powers(x, y, 2, 0)
+    truth = rng.normal(size=6)
+    z = design @ truth + rng.normal(0, 0.05, 300)
+    far = rng.random(300) < outliers
+    z[far] = rng.uniform(-3, 3, far.sum())
+    found = robust_loss(design, z, 0.05, 5.0)
+    best = minimize(lambda c: tukey((z - design @ c) / 0.05), truth, method="BFGS").fun
+    assert found == pytest.approx(best, rel=1e-3)
+
+
+def test_powers_are_all_of_the_degree() -> None:
+    x, y = np.random.default_rng(2).normal(size=(2, 9))
+    expected = np.column_stack([x**i * y**j for i in range(4) for j in range(4 - i)])
+    np.testing.assert_allclose(powers(x, y, 3, 2), np.column_stack([expected, np.zeros((9, 2))]))
+
+
+def window(surface, noise: float = 0.05, n: int = 400, seed: int = 0) -> np.ndarray:
+    """Points over 8 x 16, the window of a template of width 10."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-4, 4, n), rng.uniform(-8, 8, n)
+    return np.column_stack([x, y, surface(x, y)]) + rng.normal(0, noise, (n, 3))
+
+
+def odds(points: np.ndarray, h: float = 2.0, scale: float = 0.1) -> tuple[float, float]:
+    return advantage(points, h, 10.0, FLAT, bell().table, 4.0, 8.0, scale, 5.0)
+
+
+@pytest.mark.parametrize("base", [0.0, 0.02, -0.03])
+def test_a_ridge_beats_both_on_any_base(base: float) -> None:
+    smooth, edge = odds(window(lambda x, y: 2 * bell()(y / 10) + base * (x * x + x * y + 2 * y * y)))
+    assert smooth > 100 and edge > 100
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        lambda x, y: -0.02 * (x**2 + y**2),
+        lambda x, y: 0.02 * (x**2 - y**2) + 0.001 * y**3,
+        lambda x, y: 2.0 * (y > 1.0),
+        lambda x, y: -0.3 * np.abs(y - 0.5),
+    ],
+    ids=["bowl", "saddle", "step", "crease"],
+)
+def test_smooth_surfaces_steps_and_creases_are_explained(surface) -> None:
+    for seed in range(10):
+        assert min(odds(window(surface, seed=seed))) < 50
+
+
+def test_the_odds_are_the_same_at_every_scale() -> None:
+    points = window(lambda x, y: 2 * bell()(y / 10))
+    small = advantage(1e-3 * points, 2e-3, 1e-2, FLAT, bell().table, 4e-3, 8e-3, 1e-4, 5.0)
+    np.testing.assert_allclose(small, odds(points), rtol=1e-6)
+
+
+def scene(kind: str, rng: np.random.Generator) -> np.ndarray:
+    """Ridge-free points (8000, 3), noisy, 100 across."""
+    x, y = rng.uniform(-50, 50, (2, 8000))
+    wide, flat = rng.uniform(10, 20, 2), rng.uniform(1, 6)
+    z = {
+        "plane": lambda: 0 * x,
+        "sphere": lambda: np.sqrt(rng.uniform(75, 300) ** 2 - x * x - y * y),
+        "saddle": lambda: rng.uniform(0.001, 0.01) * (x * x - y * y),
+        "step": lambda: flat * np.tanh(x / rng.uniform(0.2, 3)),
+        "corner": lambda: -np.abs(x) * np.tan(rng.uniform(0.2, 1)),
+        "bump": lambda: flat * np.exp(-((x / wide[0]) ** 2) - (y / wide[1]) ** 2),
+    }[kind]()
+    points = np.column_stack([x, y, z])
+    return points + rng.normal(0, rng.uniform(0.02, 0.5), points.shape)
+
+
+@pytest.mark.parametrize("kind", ["plane", "sphere", "saddle", "step", "corner", "bump"])
+def test_there_is_no_ridge_on_surfaces_without_one(kind: str) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(15):
+        points = scene(kind, rng)
+        inner = points[np.hypot(*points[:, :2].T) < 30]
+        with pytest.raises(rf.NoRidgeError):
+            rf.register(points, at=inner[rng.integers(len(inner))], kind="auto")
+
+
+@pytest.mark.parametrize(
+    ("setting", "says"),
+    [
+        ({"shortest": 30.0}, "long and"),
+        ({"widest": 0.01}, "flat base|wide"),
+        ({"steepest": 0.01}, "high and"),
+    ],
+)
+def test_what_counts_as_a_ridge_can_be_set(setting: dict[str, float], says: str) -> None:
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-30, 30, (2, 6000))
+    points = np.column_stack([x, y, 2 * bell()(y / 10)]) + rng.normal(0, 0.05, (6000, 3))
+    assert rf.register(points, at=(0, 0, 2)).length > 50
+    with pytest.raises(rf.NoRidgeError, match=says):
+        rf.register(points, at=(0, 0, 2), settings=Settings(**setting))
+
+
+def test_a_ridge_cut_short_on_purpose_may_be_short() -> None:
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-30, 30, (2, 6000))
+    points = np.column_stack([x, y, 2 * bell()(y / 10)]) + rng.normal(0, 0.05, (6000, 3))
+    assert rf.register(points, at=(0, 0, 2), max_templates=1).length < 15
