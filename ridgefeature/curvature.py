@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.improve import floor, improve, loss_of
+from ridgefeature.kernels import chain
+from ridgefeature.kernels.base import flattened, standing
 from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
 from ridgefeature.kernels.evidence import explained
 from ridgefeature.settings import Settings
@@ -149,3 +151,16 @@ def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...
     smooth, variance, _ = max(tried, key=lambda fit: fit[2])
     std = np.sqrt(np.maximum(variance, 0.0))
     return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))
+
+
+def starts_on_base(last: Template, positions: Array, frames: Array, length: float) -> tuple[Array, Array]:
+    """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved."""
+    if not last.base.any():
+        return chain.starts(positions, frames, last.length, length)
+    own = last.rotation
+    places = flattened((positions - last.position) @ own, last.base)
+    turned = [own.T @ f for f in frames]
+    axes = np.array([standing(p, np.eye(3), last.base)[1].T @ f for p, f in zip(places, turned, strict=True)])
+    found = chain.starts(places, axes, last.length, length)
+    laid = [standing(p, f, last.base) for p, f in zip(*found, strict=True)]
+    return np.array([last.position + own @ p for p, _ in laid]), np.array([own @ f for _, f in laid])

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvature import Ahead, Found
+from ridgefeature.curvature import Ahead, Found, starts_on_base
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.kernels import chain as kernel
-from ridgefeature.kernels.base import flattened, standing
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -87,21 +85,8 @@ def append(chain: list[Template], settings: Settings, longest: bool = False) -> 
         evidence=0.0,
         status="start",
     )
-    found = _starts_on_base(last, positions, frames, length)
+    found = starts_on_base(last, positions, frames, length)
     return [start.changed(position=place, rotation=axes) for place, axes in zip(*found, strict=True)]
-
-
-def _starts_on_base(last: Template, positions: Array, frames: Array, length: float) -> tuple[Array, Array]:
-    """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved."""
-    if not last.base.any():
-        return kernel.starts(positions, frames, last.length, length)
-    own = last.rotation
-    places = flattened((positions - last.position) @ own, last.base)
-    turned = [own.T @ f for f in frames]
-    axes = np.array([standing(p, np.eye(3), last.base)[1].T @ f for p, f in zip(places, turned, strict=True)])
-    found = kernel.starts(places, axes, last.length, length)
-    laid = [standing(p, f, last.base) for p, f in zip(*found, strict=True)]
-    return np.array([last.position + own @ p for p, _ in laid]), np.array([own @ f for _, f in laid])
 
 
 def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = False) -> str:
