@@ -88,7 +88,7 @@ def main() -> None:
         height = rate * WIDTH
         name = f"h = {rate:g} w, steepest {steepest:.0f} degrees"
         show(name, scan(flat, height, 80.0, 60.0), height, 80.0)
-    for rate in (20.0, 10.0, 6.0, 4.0, 3.0):
+    for rate in (20.0, 10.0, 6.0, 4.0, 3.0, 2.0):
         radius = rate * WIDTH
         points = scan(curved_across(radius), HEIGHT, 80.0, min(60.0, 2 * radius))
         show(f"base curved across, radius {rate:g} w", points, HEIGHT, 80.0)

@@ -190,7 +190,8 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
     if factor == 1:
         return ridge
     names = ("arc_length", "spine", "height", "width", "height_std", "width_std", "border")
-    return replace(ridge, unit="mm", **{name: factor * getattr(ridge, name) for name in names})
+    scaled = {name: factor * getattr(ridge, name) for name in names}
+    return replace(ridge, unit="mm", curvature=ridge.curvature / factor, **scaled)
 
 
 def _solid_of(host: Any) -> TopoDS_Shape:

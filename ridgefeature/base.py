@@ -34,9 +34,10 @@ class Base(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RuledBase:
-    """Straight rules square to a path: the base of stations as they were registered; flat on a flat path.
+    """Rules square to a path: the base of stations as they were registered; flat on a flat path.
 
-    arc_length (k,) even from 0; spine (k, 3); tangent and normal (k, 3) unit and square to each other.
+    arc_length (k,) even from 0; spine (k, 3); tangent and normal (k, 3) unit and square to each other;
+    curvature (k,) of the rules, which are arcs of circles, straight where it is 0 or not given.
     Between stations all of them are C2 splines, closed: periodic ones.
     """
 
@@ -45,6 +46,7 @@ class RuledBase:
     tangent: Array
     normal: Array
     closed: bool = False
+    curvature: Array | None = None
 
     @property
     def length(self) -> float:
@@ -56,8 +58,20 @@ class RuledBase:
         spread = along(self.arc_length, np.eye(len(self.arc_length)), s, closed=self.closed)
         left = unit(spread @ np.cross(self.normal, self.tangent))
         normal = unit(spread @ self.normal)
+        if self.curvature is not None and self.curvature.any():
+            return self._arcs(spread @ self.spine, left, normal, (spread @ self.curvature)[:, None], y)
         points = (spread @ self.spine)[:, None] + y[..., None] * left[:, None]
         return points, np.broadcast_to(normal[:, None], points.shape)
+
+    @staticmethod
+    def _arcs(spine: Array, left: Array, normal: Array, curvature: Array, y: Array) -> tuple[Array, Array]:
+        """Points and unit normals (k, m, 3) at y (k, m) along circles of curvature (k, 1)."""
+        angle = curvature * y
+        sideways, half = y * np.sinc(angle / np.pi), np.sinc(0.5 * angle / np.pi)
+        rise = 0.5 * y * angle * half * half
+        left, normal = left[:, None], normal[:, None]
+        points = spine[:, None] + sideways[..., None] * left + rise[..., None] * normal
+        return points, np.cos(angle)[..., None] * normal - np.sin(angle)[..., None] * left
 
 
 def registered_base(stations: Stations) -> RuledBase:
@@ -65,7 +79,14 @@ def registered_base(stations: Stations) -> RuledBase:
     closed = bool(getattr(stations, "closed", False)) and np.array_equal(
         stations.spine[0], stations.spine[-1]
     )
-    return RuledBase(stations.arc_length, stations.spine, stations.tangent, stations.normal, closed)
+    return RuledBase(
+        stations.arc_length,
+        stations.spine,
+        stations.tangent,
+        stations.normal,
+        closed,
+        curvature=stations.curvature,
+    )
 
 
 def geodesic_curvature(stations: Stations, at: Array | None = None) -> Array:

@@ -40,6 +40,7 @@ def stretched(ridge: Ridge, length: float, fit: str = "length") -> Ridge:
         ridge,
         arc_length=np.linspace(0.0, goal, len(ridge.arc_length)),
         spine=ridge.spine[0] + rate * (ridge.spine - ridge.spine[0]),
+        curvature=ridge.curvature / rate,
         **changes,
     )
 
@@ -52,7 +53,7 @@ def _trimmed(ridge: Ridge, length: float) -> Ridge:
         )
     step = float(ridge.arc_length[1])
     s = np.linspace(0.0, length, max(_FEWEST, int(np.ceil(length / step - 1e-9)) + 1))
-    names = ("spine", "tangent", "normal", "height", "width", "border")
+    names = ("spine", "tangent", "normal", "height", "width", "border", "curvature")
     at: dict[str, Any] = {name: along(ridge.arc_length, getattr(ridge, name), s) for name in names}
     at["tangent"] = unit(at["tangent"])
     square = (at["normal"] * at["tangent"]).sum(axis=1, keepdims=True)

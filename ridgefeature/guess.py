@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvature import improve_on_base
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
@@ -127,7 +128,7 @@ def guess(
     for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
         if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
             break
-        fitted = improve(window, _template(start, pick, hints, section, settings), settings)
+        fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
         score = _score(window, fitted, pick)
         if score <= 0 or fitted.width > settings.widest * extent:
             continue
@@ -139,7 +140,19 @@ def guess(
     if best is None:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
-    return improve(window, sized(best[2], settings), settings)
+    return _fitted(window, sized(best[2], settings), pick, settings)
+
+
+def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:
+    """The start improved on a flat base, or on a curved one where that is told and explains more a point."""
+    flat = improve(window, start, settings)
+    curved = improve_on_base(window, start, settings)
+    if (
+        curved is None
+        or _score(window, curved, pick) * flat.points <= _score(window, flat, pick) * curved.points
+    ):
+        return flat
+    return curved
 
 
 def _score(window: Window, template: Template, pick: Array) -> float:

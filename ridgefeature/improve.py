@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels import appraise, residual
 from ridgefeature.kernels.algebra import moved
+from ridgefeature.kernels.base import on_base, standing
+from ridgefeature.kernels.base_terms import found_terms
 from ridgefeature.kernels.evidence import assess
 from ridgefeature.kernels.fit import bounds, fit
 from ridgefeature.kernels.objective import objective
@@ -83,7 +85,8 @@ def loss_of(settings: Settings) -> tuple[int, float]:
     return _LOSS[settings.loss], settings.tuning
 
 
-def _floor(template: Template) -> float:
+def floor(template: Template) -> float:
+    """Least noise scale of a template's residuals."""
     return _LEAST_SCALE * max(abs(template.height), 1e-3 * template.width)
 
 
@@ -100,7 +103,7 @@ def _minimise(
     c = c_functions()
     if c is None:
         _, transform, problem = appraise.prepare(
-            points, *template.shape, _floor(template), limits.prior, *loss
+            points, *template.shape, floor(template), limits.prior, *loss
         )
 
         def value(q: Array, gradient: Array) -> float:
@@ -113,7 +116,7 @@ def _minimise(
         template.position,
         template.rotation,
         *template.shape,
-        _floor(template),
+        floor(template),
         limits.prior,
         *loss,
         limits.range,
@@ -121,8 +124,7 @@ def _minimise(
         most,
         getattr(nlopt, settings.algorithm),
     )
-    fitted = template.changed(position=position, rotation=rotation, height=height, width=width)
-    return fitted, evaluations, status_of(result)
+    return _standing(template, position, rotation, height, width), evaluations, status_of(result)
 
 
 def _minimise_distance(
@@ -130,7 +132,7 @@ def _minimise_distance(
 ) -> tuple[Template, int, str]:
     """The template after one optimisation of its mean distance M to the scan (Eq. 3, 4); as `_minimise`."""
     scale, transform, _ = appraise.prepare(
-        window(template), *template.shape, _floor(template), limits.prior, *_HUBER
+        window(template), *template.shape, floor(template), limits.prior, *_HUBER
     )
 
     def value(q: Array, _: Array) -> float:
@@ -158,12 +160,23 @@ def _moved(template: Template, transform: Array, q: Array) -> Template:
     position, rotation, height, width = moved(
         template.position, template.rotation, template.height, template.width, transform, q
     )
+    return _standing(template, position, rotation, height, width)
+
+
+def _standing(template: Template, position: Array, rotation: Array, height: float, width: float) -> Template:
+    """The template after a fit, which saw its base as flat: on a curved one the frame goes along with it."""
+    if template.base.any():
+        old = template.rotation
+        place, axes = standing(old.T @ (position - template.position), old.T @ rotation, template.base)
+        position, rotation = template.position + old @ place, old @ axes
     return template.changed(position=position, rotation=rotation, height=height, width=width)
 
 
 def sample(template: Template, along: int = 9, across: int = 21) -> Array:
     """Points (along * across, 3) spread evenly over the patch, flanks included, in the frame of the scan."""
     local = residual.sampled(*template.shape, template.length, template.half_breadth, along, across)
+    if template.base.any():
+        local = on_base(local, template.base)
     return template.position + local @ template.rotation.T
 
 
@@ -271,7 +284,7 @@ def _noted(
     Misfit of a few per cent of the height is no evidence.
     """
     contrast = _LEAST_CONTRAST * abs(template.height)
-    scale, far, evidence = assess(points, *template.shape, _floor(template), contrast, *loss_of(settings))
+    scale, far, evidence = assess(points, *template.shape, floor(template), contrast, *loss_of(settings))
     noted = template.changed(
         scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence
     )
@@ -281,4 +294,7 @@ def _noted(
 def judge(points: Array, template: Template, settings: Settings) -> Template:
     """The template with standard deviations and counts as the points in its window (n, 3) give them."""
     std, inliers = appraise.deviations(points, *template.shape, template.scale, *loss_of(settings))
+    if template.base_std.any():
+        effect = found_terms(points, *template.shape, floor(template), *loss_of(settings))[2]
+        std[6:] = np.sqrt(std[6:] ** 2 + (effect * template.base_std) ** 2 @ np.ones(3))
     return template.changed(std=std, points=len(points), inliers=int(inliers))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import limits_of, loss_of, refine
 from ridgefeature.kernels import appraise
+from ridgefeature.kernels.base import flattened, on_base
 from ridgefeature.section import REACH, SECTIONS, Section, bell, uniform_basis
 from ridgefeature.settings import Settings
 from ridgefeature.settle import misfit_scale
@@ -98,10 +99,18 @@ def _refitted(window: Window, probes: tuple[Template, ...], section: Section, se
     """Loss of a few templates refitted with a section, each on the window and scale it had before."""
     total = 0.0
     for probe, fit in zip(probes, _refits(window, probes, section, settings), strict=True):
-        points = (window(probe) @ probe.rotation.T + (probe.position - fit.position)) @ fit.rotation
+        points = _seen_from(fit, window(probe), probe)
         mean, _ = appraise.mean_loss(points, *fit.shape, probe.scale, *loss_of(settings))
         total += len(points) * mean
     return float(total)
+
+
+def _seen_from(template: Template, points: Array, other: Template) -> Array:
+    """Points (n, 3) of another template's frame in that of a template; flat as each sees its base."""
+    if other.base.any():
+        points = on_base(points, other.base)
+    points = (points @ other.rotation.T + (other.position - template.position)) @ template.rotation
+    return flattened(points, template.base) if template.base.any() else points
 
 
 def _collapsed(window: Window, templates: tuple[Template, ...]) -> tuple[Array, Array, Array]:

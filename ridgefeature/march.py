@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvature import Ahead, Found, starts_on_base
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.kernels import chain as kernel
 from ridgefeature.neighbours import LEAST_ADVANCE, comes_home
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -55,6 +55,8 @@ class Track:
     """(2, m) number and sum of residuals by distance from the spine, once the track is settled."""
     closed: bool = False
     """Whether the first template follows the last: a ring."""
+    base: Found | None = None
+    """What the windows say of the base's curvature, then."""
 
 
 def reverse(template: Template) -> Template:
@@ -87,7 +89,7 @@ def append(chain: list[Template], settings: Settings, longest: bool = False) -> 
         evidence=0.0,
         status="start",
     )
-    found = kernel.starts(positions, frames, last.length, length)
+    found = starts_on_base(last, positions, frames, length)
     return [start.changed(position=place, rotation=axes) for place, axes in zip(*found, strict=True)]
 
 
@@ -250,6 +252,8 @@ def march_one_way(
     known: what is known so far, in the direction of the march; not changed.
     """
     chain, reason, skipped = list(known), "", 0.0
+    base = Ahead(settings)
+    chain[-3:] = [base.add(rough, template) for template in chain[-3:]]
     while len(known) + len(found) < settings.max_templates:
         start, fitted, why = _fit_next(rough, full, chain, skipped > 0, settings)
         if why:
@@ -265,7 +269,7 @@ def march_one_way(
             return CAME_HOME if comes_home(fitted, whole, met) else reason or _RAN_BACK
         reason, skipped = "", 0.0
         found.append(fitted)
-        chain.append(fitted)
+        chain.append(base.add(rough, fitted))
         if progress is not None:
             progress(fitted)
     return f"max_templates ({settings.max_templates}) reached"

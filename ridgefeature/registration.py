@@ -19,7 +19,7 @@ from ridgefeature.ridge import Ridge
 from ridgefeature.rings import ring_or_not
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
-from ridgefeature.settle import finish_ends, settle
+from ridgefeature.settle import finish_ends, settle, settle_base
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.verdict import no_ridge
@@ -107,7 +107,8 @@ def _track(
     first = _canonical(full, first, pick, hints)
     track = ring_or_not(full, march(rough, full, first, settings, progress), settings)
     track = place_ends(full, track, settings)
-    track = finish_ends(full, settle(full, track, settings), settings)
+    track = settle_base(full, settle(full, track, settings), settings)
+    track = finish_ends(full, track, settings)
     why = no_ridge(rough, track, pick, extent, settings)
     if why:
         raise NoRidgeError(
@@ -125,7 +126,7 @@ def _track(
     templates = tuple(with_section(t, section) for t in track.templates)
     # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
     track = settle(full, settle(full, replace(track, templates=templates), settings), settings)
-    return finish_ends(full, track, settings)
+    return finish_ends(full, settle_base(full, track, settings), settings)
 
 
 def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:
@@ -135,7 +136,11 @@ def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Te
     a march both ways would else start either way.
     """
     if hints.kind != "auto" and (first.height < 0) != (hints.kind == "groove"):
-        first = first.changed(rotation=first.rotation * np.array([1.0, -1.0, -1.0]), height=-first.height)
+        first = first.changed(
+            rotation=first.rotation * np.array([1.0, -1.0, -1.0]),
+            height=-first.height,
+            base=first.base * np.array([-1.0, 1.0, -1.0]),
+        )
     x, _, z = window(first).T
     return reverse(first) if x @ z * first.height < 0 else first
 

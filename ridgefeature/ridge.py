@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.base import Base
+from ridgefeature.base import Base, RuledBase, registered_base
 from ridgefeature.bspline import Surface
 from ridgefeature.fitting import stretched
 from ridgefeature.merge import LEAST_BORDER, along, merged_surface
@@ -46,6 +46,7 @@ class Ridge(Stations):
     source: Source | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for f in fields(Stations):
             array = getattr(self, f.name)
             if array.flags.writeable:
@@ -75,7 +76,14 @@ class Ridge(Stations):
         return self.closed and all(np.array_equal(x[0], x[-1]) for x in (getattr(self, n) for n in names))
 
     @cached_property
+    def _base(self) -> RuledBase:
+        """What it was registered on. A resized ridge has the same, whose rows and columns are then known."""
+        return registered_base(self)
+
+    @cached_property
     def _surface(self) -> Surface:
+        if self.curvature.any():
+            return surface_on(self._base, self, self.section)
         return merged_surface(
             self.arc_length,
             self.spine,
@@ -92,9 +100,10 @@ class Ridge(Stations):
         """The finished surface, C2 and bicubic: u is arc length, v the distance from the spine in widths.
 
         On a base (see ridgefeature.base), the ridge stands on that: the spine and both feet lie on it, and
-        heights are along its normals. Poles depend on base and stations alone; for the same stations they
-        are affine in height, without a base in width, too. Raises ValueError for a base of another length,
-        for which `stretched` fits the ridge, or one that gives no finite points.
+        heights are along its normals. Without one it stands on the base it was registered on. Poles depend on
+        base and stations alone; for the same stations they are affine in height, on a registered base that is
+        flat across in width, too. Raises ValueError for a base of another length, for which `stretched` fits
+        the ridge, or one that gives no finite points.
         """
         return self._surface if base is None else surface_on(base, self, self.section)
 
@@ -140,13 +149,15 @@ class Ridge(Stations):
                 f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet "
                 f"stay on the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
             )
-        return replace(
+        ridge = replace(
             self,
             height=new_height,
             width=new_width,
             height_std=_times(self.height_std, np.abs(height_rate)),
             width_std=_times(self.width_std, width_rate),
         )
+        ridge.__dict__["_base"] = self._base
+        return ridge
 
     def _changed(
         self,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvature import Found, curved, joined, terms_of
 from ridgefeature.ends import place_ends, trends
 from ridgefeature.improve import Limits, judge, limits_of, refine
 from ridgefeature.kernels import appraise
@@ -22,6 +23,9 @@ _BINS = 16
 _SAME_LENGTH = 0.15
 _CLOSE = 1.5
 """Distance of the neighbours of a template, in their mean lengths, up to which they do without it."""
+_BASE_ROUNDS = 4
+_SETTLED = 0.1
+"""Change in standard deviations from round to round below which a base counts as found."""
 
 
 def _near(templates: list[Template], i: int, closed: bool) -> list[Template]:
@@ -43,13 +47,42 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     known = trends(list(track.templates), track.closed)
     settings = settings.marching()
     bins = np.zeros((2, _BINS))
-    judged = []
+    judged: list[Template] = []
+    told: dict[int, Found] = {}
     for i in range(len(known)):
         new, points = _refit(window, known, i, track.closed, settings)
         appraise.add_misfit(bins, points, *new.shape, misfit_scale(new))
+        told[id(new)] = terms_of(points, new, settings)
         judged.append(new)
     mended = mend(window, known, judged, track.closed, settings)
-    return replace(track, templates=tuple(mended), misfit=bins)
+    base = [told.get(id(t)) or terms_of(window(t), t, settings) for t in mended]
+    return replace(track, templates=tuple(mended), misfit=bins, base=joined(base))
+
+
+def settle_base(window: Window, track: Track, settings: Settings) -> Track:
+    """The settled track settled again on a curved base, where it is one beyond chance, until that stays."""
+    for _ in range(_BASE_ROUNDS):
+        before = track.templates
+        if track.base is not None and track.base.significant(settings.base_chance):
+            known = curved(before, track.base)
+        elif any(t.base.any() for t in before):
+            known = tuple(t.changed(base=np.zeros(3), base_std=np.zeros(3)) for t in before)
+        else:
+            break
+        track = settle(window, replace(track, templates=known), settings)
+        if _alike(before, track.templates):
+            break
+    return track
+
+
+def _alike(before: tuple[Template, ...], after: tuple[Template, ...]) -> bool:
+    """Whether height and width of all templates changed by less than a part of their standard deviation."""
+    return len(before) == len(after) and all(
+        b.std is not None
+        and abs(a.height - b.height) < _SETTLED * b.std[6]
+        and abs(a.width - b.width) < _SETTLED * b.std[7]
+        for a, b in zip(before, after, strict=True)
+    )
 
 
 def _refit(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix, periodic_interpolation
 from ridgefeature.bspline import Curve
+from ridgefeature.kernels.base import on_base, standing
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -40,6 +41,12 @@ class Stations:
     """(k,) one standard deviation, as those of the height."""
     border: Array
     """(k,) distance of the flanks' outer borders from the spine; a change of h or w does not move them."""
+    curvature: Array = field(default_factory=lambda: np.empty(0), kw_only=True)
+    """(k,) of the base across the path, positive where it rises to both sides; zeros if not given."""
+
+    def __post_init__(self) -> None:
+        if not self.curvature.size:
+            object.__setattr__(self, "curvature", np.zeros(len(self.arc_length)))
 
 
 def interpolating_curve(sites: Array, points: Array) -> Curve:
@@ -67,7 +74,18 @@ def _unit(vectors: Array) -> Array:
 
 def _on_path(template: Template, x: float) -> Array:
     """Point of the template's bent spine at x along it."""
-    return template.position + template.rotation @ np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
+    place = np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
+    if template.base.any():
+        place = on_base(place[None], template.base)[0]
+    return template.position + template.rotation @ place
+
+
+def _normal(template: Template, part: float) -> Array:
+    """Normal of the base so many lengths along the template."""
+    if not template.base.any():
+        return template.rotation[:, 2]
+    place = np.array([part * template.length, 0.0, 0.0])
+    return np.asarray(template.rotation @ standing(place, np.eye(3), template.base)[1][:, 2])
 
 
 def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = False) -> Stations:
@@ -82,7 +100,7 @@ def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = 
     s = np.linspace(0.0, way.total, k)
     t = np.interp(s, way.lengths, way.fine)
     tangent = _unit(way.path(t, 1))
-    normal = way.spread_ends(s) @ np.array([q.rotation[:, 2] for q in templates])
+    normal = way.normals(templates, s)
     normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
     found = Stations(
         arc_length=s,
@@ -90,6 +108,7 @@ def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = 
         tangent=tangent,
         normal=normal,
         **_sizes(templates, way.spread(s), way.curvature(s), settings),
+        curvature=way.spread(np.clip(s, way.at[0], way.at[-1])) @ [q.base[2] for q in templates],
     )
     return _meeting(found) if closed else found
 
@@ -119,14 +138,14 @@ class _Path:
         knots, inverse = periodic_interpolation(self.at)
         return _folded(basis_matrix(knots, 3, s) @ inverse)
 
-    def spread_ends(self, s: Array) -> Array:
-        """The same for what stays as it is from the outermost centres to the ends."""
+    def normals(self, templates: tuple[Template, ...], s: Array) -> Array:
+        """(k, 3) the base's normals at arc lengths s (k,), not yet of unit length."""
+        own = [q.rotation[:, 2] for q in templates]
         if self.closed:
-            return self.spread(s)
-        matrix = natural_spline_matrix(np.concatenate([[0.0], self.at, [self.total]]), s)
-        matrix[:, 1] += matrix[:, 0]
-        matrix[:, -2] += matrix[:, -1]
-        return matrix[:, 1:-1]
+            return self.spread(s) @ np.array(own)
+        ends = np.concatenate([[0.0], self.at, [self.total]])
+        up = np.array([_normal(templates[0], -0.5), *own, _normal(templates[-1], 0.5)])
+        return natural_spline_matrix(ends, s) @ up
 
     def curvature(self, s: Array) -> Array:
         return np.interp(s, self.at, self.bends)

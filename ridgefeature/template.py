@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import rotation_of
+from ridgefeature.kernels.base import standing
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
@@ -33,6 +34,11 @@ class Template:
     section: Section
     trend: Array = field(default_factory=lambda: np.zeros(3))
     """(3,) curvature of the path, slopes of height and width along it: from the neighbours, not fitted."""
+    base: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) curvature of the base along the ridge, its twist, and its curvature across: found with its
+    neighbours, not fitted; zeros unless the data tell them. Positive where the base rises to both sides."""
+    base_std: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) one standard deviation of these, 0 where they are zeros."""
     std: Array | None = None
     """(8,) one standard deviation: translation (along: 0) and rotation in its own frame, height, width."""
     scale: float = 0.0
@@ -87,10 +93,13 @@ class Template:
         """
         bend, rise, widening = self.trend
         turn, _ = rotation_of(np.array([0.0, 0.0, bend * x]))
+        shift = np.array([x, 0.5 * bend * x**2, 0.0])
+        if self.base.any():
+            shift, turn = standing(shift, turn, self.base)
         rate_h = 1.0 if not self.height else 1.0 + min(max(rise * x / self.height, -0.5), 0.5)
         rate_w = 1.0 + min(max(widening * x / self.width, -0.5), 0.5)
         return self.changed(
-            position=self.position + self.rotation @ np.array([x, 0.5 * bend * x**2, 0.0]),
+            position=self.position + self.rotation @ shift,
             rotation=self.rotation @ turn,
             height=float(self.height * rate_h),
             width=float(self.width * rate_w),

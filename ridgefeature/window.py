@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.grid import Grid, nearest_distances, points_in_ball, points_in_box
+from ridgefeature.kernels.base import flattened
 from ridgefeature.kernels.region import covering, select, thin
 from ridgefeature.template import Template
 
@@ -63,7 +64,7 @@ class Window:
         return Window(self.grid, self.spacing, most, self)
 
     def __call__(self, template: Template, before: float = 1.0, after: float = 1.0) -> Array:
-        """Points (m, 3) in the template's frame.
+        """Points (m, 3) in the template's frame, flattened where its base is known to be curved.
 
         The window covers the patch, flanks included, up to twice the height and a quarter of the width above
         and below the base. `before` and `after` stretch its halves along the ridge.
@@ -71,7 +72,24 @@ class Window:
         half_y = template.half_breadth
         half_z = 2.0 * abs(template.height) + 0.25 * template.width
         low, high = -0.5 * template.length * before, 0.5 * template.length * after
-        window = (template.position, template.rotation, low, high, half_y, half_z)
+        if template.base.any():
+            return self._flattened(template, low, high, half_y, half_z)
+        return self._inside((template.position, template.rotation, low, high, half_y, half_z))
+
+    def _flattened(self, template: Template, low: float, high: float, half_y: float, half_z: float) -> Array:
+        """The points of the window over a curved base, which is as large within the base."""
+        xx, xy, yy = np.abs(template.base)
+        far = max(-low, high)
+        # A point above the base leans outwards where the base falls, and away from where it rises.
+        stretch = 1.0 + half_z * (max(xx, yy) + xy)
+        sag = 0.5 * xx * far**2 + xy * far * half_y + 0.5 * yy * half_y**2
+        box = (low * stretch, high * stretch, half_y * stretch, 1.2 * sag + half_z)
+        points = flattened(self._inside((template.position, template.rotation, *box)), template.base)
+        x, y, z = points.T
+        return points[(x >= low) & (x <= high) & (np.abs(y) <= half_y) & (np.abs(z) <= half_z)]
+
+    def _inside(self, window: _Box) -> Array:
+        """Points (m, 3) of a box, in its frame."""
         last, found = self._last
         if last is None or last[0] is not window[0] or last[1] is not window[1] or last[2:] != window[2:]:
             box, points = self._region(window)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from dataclasses import asdict, fields
+from collections.abc import Container, Iterable
+from dataclasses import Field, asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     from ridgefeature.ridge import Ridge
 
 FORMAT = "ridgefeature.ridge"
-VERSION = 1
+VERSION, FLAT = 2, 1
+"""Newest version, and that of a ridge whose base is flat across, which holds no curvature."""
+_OF_CURVED = ("curvature", "base", "base_std")
 SUFFIX = ".ridge.json"
 
 
@@ -28,7 +31,7 @@ def to_document(ridge: Ridge) -> dict[str, Any]:
     """The ridge as plain lists, numbers and words."""
     return {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if _is_curved(ridge) else FLAT,
         "unit": ridge.unit,
         "source": None if ridge.source is None else asdict(ridge.source),
         "pick": ridge.pick.tolist(),
@@ -36,12 +39,20 @@ def to_document(ridge: Ridge) -> dict[str, Any]:
         "closed": ridge.closed,
         "stop": list(ridge.stop),
         "section": {"name": ridge.section.name, "coefficients": ridge.section.coefficients.tolist()},
-        "stations": {f.name: _plain(getattr(ridge, f.name)) for f in fields(Stations)},
+        "stations": _values(ridge, fields(Stations), () if _is_curved(ridge) else _OF_CURVED),
         "templates": [
-            {f.name: _plain(getattr(t, f.name)) for f in fields(Template) if f.name != "section"}
+            _values(t, fields(Template), {"section", *(() if _is_curved(ridge) else _OF_CURVED)})
             for t in ridge.templates
         ],
     }
+
+
+def _is_curved(ridge: Ridge) -> bool:
+    return bool(ridge.curvature.any() or any(t.base.any() for t in ridge.templates))
+
+
+def _values(of: Any, named: Iterable[Field[Any]], without: Container[str]) -> dict[str, Any]:
+    return {f.name: _plain(getattr(of, f.name)) for f in named if f.name not in without}
 
 
 def from_document(document: Any) -> Ridge:
@@ -51,20 +62,23 @@ def from_document(document: Any) -> Ridge:
 
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f"expected a ridge feature (format {FORMAT!r}); this is something else")
-    if document.get("version") != VERSION:
+    if document.get("version") not in (FLAT, VERSION):
         raise ValueError(
-            f"expected version {VERSION} of the feature format, got {document.get('version')!r}; "
+            f"expected version {FLAT} or {VERSION} of the feature format, got {document.get('version')!r}; "
             "read it with the release that wrote it, or update ridgefeature"
         )
     try:
         section = Section(
             np.array(document["section"]["coefficients"], dtype=np.float64), document["section"]["name"]
         )
-        stations = {f.name: _array(document["stations"][f.name]) for f in fields(Stations)}
+        without = _OF_CURVED if document["version"] == FLAT else ()
+        stations = {
+            f.name: _array(document["stations"][f.name]) for f in fields(Stations) if f.name not in without
+        }
         ridge = Ridge(
             **stations,
             section=section,
-            templates=tuple(_template(t, section) for t in document["templates"]),
+            templates=tuple(_template(t, section, without) for t in document["templates"]),
             stop=(str(document["stop"][0]), str(document["stop"][1])),
             closed=bool(document["closed"]),
             unit=str(document["unit"]),
@@ -144,12 +158,19 @@ def _number(value: Any) -> Any:
     return float(value["float"]) if isinstance(value, dict) else value
 
 
-_TEMPLATE_ARRAYS = {"position": (3,), "rotation": (3, 3), "trend": (3,), "std": (8,)}
+_TEMPLATE_ARRAYS = {
+    "position": (3,),
+    "rotation": (3, 3),
+    "trend": (3,),
+    "base": (3,),
+    "base_std": (3,),
+    "std": (8,),
+}
 
 
-def _template(document: dict[str, Any], section: Section) -> Template:
+def _template(document: dict[str, Any], section: Section, without: Container[str]) -> Template:
     values: dict[str, Any] = {"section": section}
-    for name in (f.name for f in fields(Template) if f.name != "section"):
+    for name in (f.name for f in fields(Template) if f.name != "section" and f.name not in without):
         value = document[name]
         if name in _TEMPLATE_ARRAYS and not (name == "std" and value is None):
             values[name] = _array(value)

@@ -1,0 +1,174 @@
+"""How curved the base is under a chain of templates: found, smoothed along it, zero unless significant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.improve import floor, improve, loss_of
+from ridgefeature.kernels import chain
+from ridgefeature.kernels.base import flattened, standing
+from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
+from ridgefeature.kernels.evidence import explained
+from ridgefeature.settings import Settings
+from ridgefeature.template import Template
+from ridgefeature.window import Window
+
+Array = NDArray[np.float64]
+
+_LARGEST = 0.5
+"""Slope of the base at the outer border of a template's flanks beyond which it is something else."""
+_ROUNDS = 3
+_PART = 0.1
+"""Part of the allowed chance that one template alone may use up: a march asks many times."""
+_SURE_OF_SCALE = 0.37
+"""Efficiency of the median absolute deviation: degrees of freedom of the scale a point."""
+_UNTOLD = 0.015
+"""Curvature in reciprocal widths that a template may see where its path bends or its sizes change."""
+_KEPT = 0.6
+"""What of earlier templates still counts at the next one."""
+_DRIFTS = 10.0 ** np.arange(-10, 0)
+"""Tried drifts of the terms: variance a length, in powers of the width."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What n windows say of the base under them: terms (n, 3), their information (n, 3, 3), and how many
+    points (n,) told it. The information is zero where a window does not tell."""
+
+    terms: Array
+    information: Array
+    points: Array
+
+    @property
+    def mean(self) -> Array:
+        """(3,) weighted by information; zeros where that is not enough."""
+        whole = self.information.sum(axis=0)
+        pull = np.einsum("nij,nj->i", self.information, self.terms)
+        return solved(whole, pull)
+
+    def significant(self, chance: float) -> bool:
+        """Whether the terms differ from zero by more than chance: their mean, or all together.
+
+        Two likelihood ratio tests that share the chance between them. The noise is known from the same
+        points, so the ratios are those of Student's distribution.
+        """
+        if chance >= 0.5:
+            return False
+        known = _SURE_OF_SCALE * np.maximum(self.points - FREE, 1.0)
+        mean = self.mean
+        of_mean = float(mean @ self.information.sum(axis=0) @ mean)
+        each = np.einsum("ni,nij,nj->n", self.terms, self.information, self.terms)
+        total, whole = float((known * np.log1p(each / known)).sum()), float(known.sum())
+        told = int((each > 0).sum())
+        return told > 0 and (
+            whole * np.log1p(of_mean / whole) > _chi_square(3, 0.5 * chance)
+            or total > _chi_square(3 * told, 0.5 * chance)
+        )
+
+
+def terms_of(points: Array, template: Template, settings: Settings) -> Found:
+    """What the points in a template's window, in its frame, say of its base."""
+    step, information, _ = found_terms(points, *template.shape, floor(template), *loss_of(settings))
+    terms = template.base + step
+    if np.abs(terms).max() * template.half_breadth > _LARGEST:
+        terms, information = template.base, np.zeros((3, 3))
+    return Found(terms[None], information[None], np.array([float(len(points))]))
+
+
+_NAMES = ("terms", "information", "points")
+
+
+def joined(found: list[Found]) -> Found:
+    """What all of them say, in this order."""
+    return Found(*(np.concatenate([getattr(f, name) for f in found]) for name in _NAMES))
+
+
+def _roughly(found: Found, width: float) -> Found:
+    """The same, less sure: a template alone knows no bend of its path and no slopes of height and width."""
+    return replace(
+        found, information=np.array([softened(i, (_UNTOLD / width) ** 2) for i in found.information])
+    )
+
+
+def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
+    """The start improved on a base as curved as its window says; None where that says nothing of it."""
+    fitted = start
+    for _ in range(_ROUNDS):
+        found = _roughly(terms_of(window(fitted), fitted, settings), fitted.width)
+        if not found.significant(_PART * settings.base_chance):
+            return None if fitted is start else fitted
+        fitted = improve(window, fitted.changed(base=found.mean), settings)
+        if fitted.status in ("failed", "no data"):
+            return None
+    return fitted
+
+
+@dataclass(eq=False)
+class Ahead:
+    """What a march knows of the base ahead, from the templates behind; it forgets as it goes on."""
+
+    settings: Settings
+    found: Found = field(default_factory=lambda: Found(np.zeros((1, 3)), np.zeros((1, 3, 3)), np.zeros(1)))
+
+    def add(self, window: Window, template: Template) -> Template:
+        """Learn from a fitted template; it is returned with the terms that are now expected of the base."""
+        new = _roughly(terms_of(window(template), template, self.settings), template.width)
+        old = replace(
+            self.found, information=_KEPT * self.found.information, points=_KEPT * self.found.points
+        )
+        both = Found(
+            *(np.concatenate(pair) for pair in zip(vars(old).values(), vars(new).values(), strict=True))
+        )
+        self.found = Found(
+            both.mean[None],
+            both.information.sum(axis=0, keepdims=True),
+            both.points.sum(keepdims=True),
+        )
+        if not self.found.significant(_PART * self.settings.base_chance):
+            return template.changed(base=np.zeros(3)) if template.base.any() else template
+        if template.base.any():
+            return template.changed(base=both.mean)
+        # A curved base that shall explain a template for the first time must do so better than a flat one.
+        bent = improve(window, template.changed(base=both.mean), self.settings)
+        return bent if _better(window, bent, template) else template
+
+
+def _better(window: Window, template: Template, other: Template) -> bool:
+    """Whether a template is about as wide as another of the same ridge, and leaves less unexplained."""
+    if template.status in ("failed", "no data") or not 0.5 < template.width / other.width < 2.0:
+        return False
+    return bool(explained(window(template), *template.shape) > explained(window(other), *other.shape))
+
+
+def _chi_square(degrees: int, chance: float) -> float:
+    """Value that chi-square of so many degrees exceeds by this chance (Wilson and Hilferty 1931)."""
+    share = 2.0 / (9.0 * degrees)
+    return degrees * (1.0 - share + NormalDist().inv_cdf(1.0 - chance) * share**0.5) ** 3
+
+
+def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...]:
+    """The templates with the terms of their base smoothed along the chain, as much as is most likely."""
+    steps = np.linalg.norm(np.diff([t.position for t in templates], axis=0), axis=1)
+    at = np.concatenate([[0.0], np.cumsum(steps)])
+    width = float(np.median([t.width for t in templates]))
+    tried = [smoothed(at, found.terms, found.information, drift / width**3) for drift in _DRIFTS]
+    smooth, variance, _ = max(tried, key=lambda fit: fit[2])
+    std = np.sqrt(np.maximum(variance, 0.0))
+    return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))
+
+
+def starts_on_base(last: Template, positions: Array, frames: Array, length: float) -> tuple[Array, Array]:
+    """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved."""
+    if not last.base.any():
+        return chain.starts(positions, frames, last.length, length)
+    own = last.rotation
+    places = flattened((positions - last.position) @ own, last.base)
+    turned = [own.T @ f for f in frames]
+    axes = np.array([standing(p, np.eye(3), last.base)[1].T @ f for p, f in zip(places, turned, strict=True)])
+    found = chain.starts(places, axes, last.length, length)
+    laid = [standing(p, f, last.base) for p, f in zip(*found, strict=True)]
+    return np.array([last.position + own @ p for p, _ in laid]), np.array([own @ f for _, f in laid])
