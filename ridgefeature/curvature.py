@@ -96,6 +96,8 @@ def _roughly(found: Found, width: float) -> Found:
 
 def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
     """The start improved on a base as curved as its window says; None where that says nothing of it."""
+    if settings.flat:
+        return None
     fitted = start
     for _ in range(_ROUNDS):
         found = _roughly(terms_of(window(fitted), fitted, settings), fitted.width)
@@ -116,6 +118,8 @@ class Ahead:
 
     def add(self, window: Window, template: Template) -> Template:
         """Learn from a fitted template; it is returned with the terms that are now expected of the base."""
+        if self.settings.flat:
+            return template
         new = _roughly(terms_of(window(template), template, self.settings), template.width)
         old = replace(
             self.found, information=_KEPT * self.found.information, points=_KEPT * self.found.points

@@ -84,17 +84,9 @@ class Ridge(Stations):
     def _surface(self) -> Surface:
         if self.curvature.any():
             return surface_on(self._base, self, self.section)
-        return merged_surface(
-            self.arc_length,
-            self.spine,
-            self.across,
-            self.normal,
-            self.height,
-            self.width,
-            self.border,
-            self.section,
-            self._meets_itself,
-        )
+        sizes = self.height, self.width, self.border
+        path = self.arc_length, self.spine, self.across, self.normal
+        return merged_surface(*path, *sizes, self.section, self._meets_itself)
 
     def surface(self, base: Base | None = None) -> Surface:
         """The finished surface, C2 and bicubic: u is arc length, v the distance from the spine in widths.

@@ -71,7 +71,8 @@ class Settings:
     widest: float = _setting(0.5, "width of the widest ridge, in parts of the scan's extent")
     steepest: float = _setting(4.0, "height of the steepest ridge")
     base_chance: float = _setting(
-        1e-3, "chance at which a flat base is taken for a curved one; 0.5 or more: bases are flat"
+        0.5,
+        "chance at which a flat base is taken for a curved one, such as 0.001; 0.5 or more: bases are flat",
     )
     look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")
     max_templates: int = _setting(500, "templates in all")
@@ -124,6 +125,11 @@ class Settings:
         if self.optimiser != "auto":
             return self.optimiser
         return "LN_BOBYQA" if self.measure == "M" else "LD_LBFGS"
+
+    @property
+    def flat(self) -> bool:
+        """Whether every base is taken for flat."""
+        return self.base_chance >= 0.5
 
     def marching(self) -> Settings:
         """The settings for a template whose neighbour is known."""

@@ -52,16 +52,19 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
     for i in range(len(known)):
         new, points = _refit(window, known, i, track.closed, settings)
         appraise.add_misfit(bins, points, *new.shape, misfit_scale(new))
-        told[id(new)] = terms_of(points, new, settings)
+        if not settings.flat:
+            told[id(new)] = terms_of(points, new, settings)
         judged.append(new)
     mended = mend(window, known, judged, track.closed, settings)
+    if settings.flat:
+        return replace(track, templates=tuple(mended), misfit=bins)
     base = [told.get(id(t)) or terms_of(window(t), t, settings) for t in mended]
     return replace(track, templates=tuple(mended), misfit=bins, base=joined(base))
 
 
 def settle_base(window: Window, track: Track, settings: Settings) -> Track:
     """The settled track settled again on a curved base, where it is one beyond chance, until that stays."""
-    for _ in range(_BASE_ROUNDS):
+    for _ in range(0 if settings.flat else _BASE_ROUNDS):
         before = track.templates
         if track.base is not None and track.base.significant(settings.base_chance):
             known = curved(before, track.base)
