@@ -88,11 +88,11 @@ class Change:
         """
         got, ground = 0.0, self.ground or ground_under(self.base)
         for accuracy in INTEGRATION[0 if self.rough else 2 :]:
-            if accuracy not in ground.measured:
-                fine = accuracy or _GROUND
+            fine = accuracy or _GROUND
+            if fine not in ground.measured:
                 before = sum(_cone(f, ground.near, fine) for f in self.old)
-                ground.measured[accuracy] = sum(_cone(f, ground.near, fine) for f in self.remaining) - before
-            got = ground.measured[accuracy] + sum(_cone(f, ground.near, accuracy) for f in self.new)
+                ground.measured[fine] = sum(_cone(f, ground.near, fine) for f in self.remaining) - before
+            got = ground.measured[fine] + sum(_cone(f, ground.near, accuracy) for f in self.new)
             if abs(got - self.volume_expected) <= 0.5 * self.volume_error:
                 break
         return got

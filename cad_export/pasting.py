@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -13,14 +15,14 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from cad_export.carried import faces_of, record_of
 from cad_export.check import subshapes
 from cad_export.face_base import FaceBase, face_base, vector
 from cad_export.geometry import topods
 from cad_export.headroom import check_height
-from cad_export.inset import InsetReport, face_of, inset_at
+from cad_export.inset import face_of, inset_at
 from cad_export.paste_history import Placement, remember
 from cad_export.site import Site
 from cad_export.strip import OffFaceError
@@ -69,13 +71,14 @@ def paste(
     where = (_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
     try:
         stand = _stand(*where)
-        result, grown, told = _set_in(solid, stand, h, w, check)
+        site = _site(solid, stand, h, w)
+        result, grown, told = inset_at(solid, site, h, check)
     except OffFaceError as error:
-        try:  # other faces may go on from this one
+        with _instead(error):  # other faces may go on from this one
             stand = _stand(*where, beyond=True)
-            result, grown, told = _set_in(solid, stand, h, w, check)
-        except ValueError:
-            raise error from None
+        site = _site(solid, stand, h, w)  # what it says of h and w holds on any face
+        with _instead(error):
+            result, grown, told = inset_at(solid, site, h, check)
     if report is not None:
         report.update(asdict(told))
     options = {"fit": fit, "scale": scale, "mirror": mirror, "reverse": reverse}
@@ -168,12 +171,20 @@ def _stand(
     return stand(float(w)) if own and found.base.slim else found
 
 
-def _set_in(
-    solid: TopoDS_Shape, stand: _Stand, h: float, w: float, check: bool
-) -> tuple[TopoDS_Solid, TopoDS_Face, InsetReport]:
+def _site(solid: TopoDS_Shape, stand: _Stand, h: float, w: float) -> Site:
+    """The site for these rates, which the place has room for."""
     site = stand.site(h, w)
     check_height(solid, stand.base, stand.ridge.resized(w=w), h)
-    return inset_at(solid, site, h, check)
+    return site
+
+
+@contextmanager
+def _instead(error: ValueError) -> Iterator[None]:
+    """Raise this error for any ValueError inside."""
+    try:
+        yield
+    except ValueError:
+        raise error from None
 
 
 def _checked(ridge: Any) -> Ridge:

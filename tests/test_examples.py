@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from example_runner import FOLDER, run_example
 
-FOLDER = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(path.name for path in FOLDER.glob("*.py") if "__main__" in path.read_text())
 # Those that make a part run where others open its file.
 HERE = [name for name in SCRIPTS if "[FOLDER]" not in (FOLDER / name).read_text()]
@@ -22,17 +20,7 @@ def test_the_examples_are_there() -> None:
 
 @pytest.mark.parametrize("name", HERE)
 def test_example(name: str, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, FOLDER / name],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip(), "an example prints what it found"
-    assert list(tmp_path.iterdir()) == [], "an example leaves nothing behind"
+    run_example(name, tmp_path)
 
 
 def test_the_panel_is_a_script_with_parameters() -> None:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from example_runner import FOLDER, run_example
 from freecad_tools import inspect_step, inspect_step_by_gmsh, needs_freecad, needs_gmsh
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 
 import cad_export as cx
 from cad_export.check import subshapes, volume
 
-FOLDER = Path(__file__).parents[1] / "examples"
 # An example that makes a part takes the folder for its files.
 SCRIPTS = sorted(path.name for path in FOLDER.glob("*.py") if "[FOLDER]" in path.read_text())
 
@@ -32,17 +30,7 @@ class Written:
 @pytest.fixture(scope="module", params=SCRIPTS)
 def written(request, tmp_path_factory) -> list[Written]:
     folder, empty = tmp_path_factory.mktemp("example"), tmp_path_factory.mktemp("empty")
-    done = subprocess.run(
-        [sys.executable, FOLDER / request.param, str(folder)],
-        cwd=empty,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip(), "an example prints what it found"
-    assert list(empty.iterdir()) == [], "an example leaves nothing behind"
+    run_example(request.param, empty, str(folder))
     found = []
     for path in sorted(folder.glob("*.step")):
         shape = cx.read_step(path)

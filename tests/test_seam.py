@@ -6,6 +6,7 @@ import cadquery as cq
 import numpy as np
 import pytest
 from inset_helpers import Map, box, curved_face, cylinder, cylinder_map, flat_ridge, on_map, sphere_map
+from made_ridges import made_ridge
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
@@ -14,6 +15,7 @@ from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
+import cad_export as cx
 from cad_export.certificate import certify, free_mesh_edges
 from cad_export.check import subshapes, volume
 from cad_export.crossings import same_surface
@@ -326,6 +328,21 @@ def test_off_the_faces_is_an_error_in_words() -> None:
     )
     with pytest.raises(ValueError, match=r"leaves the face's outline.*the host is .* off"):
         fallback(host.wrapped, site, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"h": -50}, "h: expected at least .* another part of the host"),
+        ({"w": 50}, "width: expected at most"),
+        ({"at": (36, 0, 5)}, "leaves the face"),
+    ],
+)
+def test_over_two_faces_it_is_said_what_is_wrong(options, says) -> None:
+    host = in_two(box(), (1, 0.2, 0))
+    where = {"at": (0, 0, 5), "direction": (1, 0, 0)} | options
+    with pytest.raises(ValueError, match=says):
+        cx.paste(made_ridge(30.0), host, **where)
 
 
 def test_a_surface_that_points_inwards_is_an_error_in_words() -> None:
