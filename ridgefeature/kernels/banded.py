@@ -1,0 +1,70 @@
+"""Symmetric positive definite systems of a small bandwidth: Cholesky's factor, solutions, variances.
+
+A matrix (n, n) whose entries vanish more than m places from the diagonal is held as its lower band (n, m + 1):
+band[i, k] is the entry at row i and column i - k. Source: Golub and Van Loan, Matrix Computations, 4.3.5; for
+the inverse within the band Erisman and Tinney 1975 (Takahashi's recursion).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.residual import OPTIONS
+
+Floats = NDArray[np.float64]
+
+
+@njit(**OPTIONS)
+def factor(band: Floats) -> tuple[Floats, bool]:
+    """The lower band of Cholesky's factor, and whether the matrix is positive definite."""
+    n, m = band.shape[0], band.shape[1] - 1
+    out = np.zeros_like(band)
+    for i in range(n):
+        first = max(0, i - m)
+        for j in range(first, i + 1):
+            total = band[i, i - j]
+            for k in range(max(first, j - m), j):
+                total -= out[i, i - k] * out[j, j - k]
+            if j < i:
+                out[i, i - j] = total / out[j, 0]
+            elif total > 0.0:
+                out[i, 0] = math.sqrt(total)
+            else:
+                return out, False
+    return out, True
+
+
+@njit(**OPTIONS)
+def solve(factored: Floats, right: Floats) -> Floats:
+    """Solution (n,) for a right side (n,), by the factor."""
+    n, m = factored.shape[0], factored.shape[1] - 1
+    x = right.copy()
+    for i in range(n):
+        for k in range(1, min(m, i) + 1):
+            x[i] -= factored[i, k] * x[i - k]
+        x[i] /= factored[i, 0]
+    for i in range(n - 1, -1, -1):
+        for k in range(1, min(m, n - 1 - i) + 1):
+            x[i] -= factored[i + k, k] * x[i + k]
+        x[i] /= factored[i, 0]
+    return x
+
+
+@njit(**OPTIONS)
+def inverse_band(factored: Floats) -> Floats:
+    """The lower band of the inverse (n, m + 1), by the factor."""
+    n, m = factored.shape[0], factored.shape[1] - 1
+    out = np.zeros_like(factored)
+    for i in range(n - 1, -1, -1):
+        last = min(i + m, n - 1)
+        for j in range(last, i - 1, -1):
+            total = 1.0 / factored[i, 0] if i == j else 0.0
+            for k in range(i + 1, last + 1):
+                low, high = min(k, j), max(k, j)
+                total -= factored[k, k - i] * out[high, high - low]
+            out[j, j - i] = total / factored[i, 0]
+    return out

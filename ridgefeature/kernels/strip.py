@@ -1,0 +1,255 @@
+"""Points along a ridge in coordinates of its path, and what each short stretch of them says of the ridge.
+
+A path is given at nodes: origin, tangent, left and normal (n, 3) each, and the curvature (n,) of its base
+across. Coordinates of a point are s in nodes, y along the base to the left, and z over the base.
+
+The surface is z = a + b y + c y^2 + h f((y - e) / w): the base's offset, tilt and curvature, the section f
+with height, width and its shift sideways. In all arrays they are ordered a, b, c, e, h, w.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.residual import INNER, OPTIONS, split
+
+Floats = NDArray[np.float64]
+TERMS = 6
+A, B, C, E, H, W = range(TERMS)
+_LEAST_STEP = 0.15
+"""Where neighbouring nodes' planes are this near to each other, in parts of their distance, they soon meet."""
+
+
+@njit(**OPTIONS)
+def rectified(
+    points: Floats,
+    origin: Floats,
+    tangent: Floats,
+    left: Floats,
+    normal: Floats,
+    curvature: Floats,
+    reach: Floats,
+    low: Floats,
+    high: Floats,
+    first: int,
+) -> Floats:
+    """Coordinates (m, 3) of those points (n, 3) that lie between the first and the last node.
+
+    All in the points' frame. reach (nodes,): how far to either side; low, high (nodes,): how far below and
+    above the base. The nodes are numbered from `first` on. Of several places that a point may have the one
+    nearest to the path is taken.
+    """
+    n = origin.shape[0]
+    out = np.empty((points.shape[0], 3))
+    m = 0
+    ahead = np.empty(n)
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        for j in range(n):
+            ahead[j] = (
+                (x - origin[j, 0]) * tangent[j, 0]
+                + (y - origin[j, 1]) * tangent[j, 1]
+                + (z - origin[j, 2]) * tangent[j, 2]
+            )
+        best = -1.0
+        for j in range(n - 1):
+            if not ahead[j] >= 0.0 > ahead[j + 1]:
+                continue
+            dx, dy, dz = origin[j + 1, 0] - origin[j, 0], origin[j + 1, 1] - origin[j, 1], origin[j + 1, 2] - origin[j, 2]
+            step = math.sqrt(dx * dx + dy * dy + dz * dz)
+            span = ahead[j] - ahead[j + 1]
+            if span < _LEAST_STEP * step:
+                continue
+            u = ahead[j] / span
+            v = 1.0 - u
+            # The cubic that starts and ends along the tangents (Hermite), so that the path has no corners.
+            k0, k1 = step * u * v * v, -step * u * u * v
+            along = u * u * (3.0 - 2.0 * u)
+            px = x - origin[j, 0] - along * dx - k0 * tangent[j, 0] - k1 * tangent[j + 1, 0]
+            py = y - origin[j, 1] - along * dy - k0 * tangent[j, 1] - k1 * tangent[j + 1, 1]
+            pz = z - origin[j, 2] - along * dz - k0 * tangent[j, 2] - k1 * tangent[j + 1, 2]
+            lx, ly, lz = (
+                v * left[j, 0] + u * left[j + 1, 0],
+                v * left[j, 1] + u * left[j + 1, 1],
+                v * left[j, 2] + u * left[j + 1, 2],
+            )
+            nx, ny, nz = (
+                v * normal[j, 0] + u * normal[j + 1, 0],
+                v * normal[j, 1] + u * normal[j + 1, 1],
+                v * normal[j, 2] + u * normal[j + 1, 2],
+            )
+            side = (px * lx + py * ly + pz * lz) / math.sqrt(lx * lx + ly * ly + lz * lz)
+            over = (px * nx + py * ny + pz * nz) / math.sqrt(nx * nx + ny * ny + nz * nz)
+            bend = v * curvature[j] + u * curvature[j + 1]
+            if abs(bend) > 1e-12:
+                # Unrolled: the base is an arc of a circle, heights are along its radii.
+                room = 1.0 - bend * over
+                if room <= 0.2:
+                    continue
+                radius = math.sqrt(bend * bend * side * side + room * room)
+                side, over = math.atan2(bend * side, room) / bend, (1.0 - radius) / bend
+            far = v * reach[j] + u * reach[j + 1]
+            if abs(side) > far or over < v * low[j] + u * low[j + 1] or over > v * high[j] + u * high[j + 1]:
+                continue
+            if best < 0.0 or abs(side) < best:
+                best = abs(side)
+                out[m, 0], out[m, 1], out[m, 2] = first + j + u, side, over
+        if best >= 0.0:
+            m += 1
+    return out[:m]
+
+
+@njit(**INNER)
+def _section(
+    eta: float, constant: Floats, linear: Floats, quadratic: Floats, cubic: Floats
+) -> tuple[float, float, float]:
+    """Height, slope and second derivative of the section at eta."""
+    spans = constant.size - 2.0
+    position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
+    span = np.int64(position)
+    t = position - span
+    b, c, d = linear[span], quadratic[span], cubic[span]
+    return (
+        constant[span] + t * (b + t * (c + t * d)),
+        spans * (b + t * (2.0 * c + 3.0 * t * d)),
+        spans * spans * (2.0 * c + 6.0 * t * d),
+    )
+
+
+@njit(**OPTIONS)
+def offsets(points: Floats, terms: Floats, table: Floats) -> Floats:
+    """Distances (m,) of points (m, 3) in path coordinates from the surface; terms (nodes, 6)."""
+    constant, linear, quadratic, cubic = split(table)
+    out = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
+        j = min(np.int64(points[i, 0]), terms.shape[0] - 2)
+        u = points[i, 0] - j
+        v = 1.0 - u
+        y = points[i, 1]
+        a, b, c = (
+            v * terms[j, A] + u * terms[j + 1, A],
+            v * terms[j, B] + u * terms[j + 1, B],
+            v * terms[j, C] + u * terms[j + 1, C],
+        )
+        e, h, w = (
+            v * terms[j, E] + u * terms[j + 1, E],
+            v * terms[j, H] + u * terms[j + 1, H],
+            v * terms[j, W] + u * terms[j + 1, W],
+        )
+        f, slope, _ = _section((y - e) / w, constant, linear, quadratic, cubic)
+        tilt = b + 2.0 * c * y + h * slope / w
+        out[i] = (points[i, 2] - a - y * (b + c * y) - h * f) / math.sqrt(1.0 + tilt * tilt)
+    return out
+
+
+@njit(**OPTIONS)
+def mixture(r: Floats, scale: float, share: float, span: float, rounds: int) -> tuple[float, float, float]:
+    """Noise scale and share of strays, and the density of strays over that of the others at their middle.
+
+    Residuals r (n,) are a mixture of a normal distribution and strays spread evenly over `span` (Dempster,
+    Laird and Rubin 1977), to begin with of this scale and this share of strays.
+    """
+    least = 1e-3 * scale
+    stray = 0.0
+    for _ in range(rounds):
+        stray = share / (1.0 - share) * 2.5066282746310002 * scale / span
+        total = square = 0.0
+        inverse = 1.0 / scale
+        for i in range(r.size):
+            x = r[i] * inverse
+            weight = 1.0 / (1.0 + stray * math.exp(min(0.5 * x * x, 50.0)))
+            total += weight
+            square += weight * r[i] * r[i]
+        scale = max(math.sqrt(square / max(total, 1.0)), least)
+        share = min(max(1.0 - total / r.size, 1e-3), 0.5)
+    return scale, share, stray
+
+
+@njit(**OPTIONS)
+def information(
+    points: Floats, terms: Floats, table: Floats, scale: float, stray: float, even: float
+) -> tuple[Floats, Floats, Floats]:
+    """What the points of each stretch between two nodes say of the terms there.
+
+    Weighted normal equations in units of the noise scale: matrices (nodes - 1, 6, 6), right sides
+    (nodes - 1, 6), and the sums (4,) over all points of 1, weight, psi^2 and psi'. Derivatives are taken at
+    the point's own y and the stretch's middle.
+    """
+    constant, linear, quadratic, cubic = split(table)
+    stretches = terms.shape[0] - 1
+    matrix, right = np.zeros((stretches, TERMS, TERMS)), np.zeros((stretches, TERMS))
+    sums = np.zeros(4)
+    row, turn = np.empty(TERMS), np.empty(TERMS)
+    for i in range(points.shape[0]):
+        j = min(np.int64(points[i, 0]), stretches - 1)
+        u = points[i, 0] - j
+        v = 1.0 - u
+        y = points[i, 1]
+        a, b, c = (
+            v * terms[j, A] + u * terms[j + 1, A],
+            v * terms[j, B] + u * terms[j + 1, B],
+            v * terms[j, C] + u * terms[j + 1, C],
+        )
+        e, h, w = (
+            v * terms[j, E] + u * terms[j + 1, E],
+            v * terms[j, H] + u * terms[j + 1, H],
+            v * terms[j, W] + u * terms[j + 1, W],
+        )
+        eta = (y - e) / w
+        f, slope, bow = _section(eta, constant, linear, quadratic, cubic)
+        slope, bow = slope * h / w, bow * h / (w * w)
+        tilt = b + 2.0 * c * y + slope
+        inverse = 1.0 / math.sqrt(1.0 + tilt * tilt)
+        # Noise along a bent surface leads off it, to the outside.
+        bias = 0.5 * scale * (2.0 * c + bow) * inverse * (1.0 + 2.0 * even * (1.0 - inverse * inverse))
+        r = (points[i, 2] - a - y * (b + c * y) - h * f) * inverse / scale - min(max(bias, -0.5), 0.5)
+        weight = 1.0 / (1.0 + stray / inverse * math.exp(min(0.5 * r * r, 50.0)))
+        sums[0] += 1.0
+        sums[1] += weight
+        sums[2] += weight * weight * r * r
+        sums[3] += weight - weight * (1.0 - weight) * r * r
+        # The distance also changes with the slope, by which heights are divided.
+        curl = (r * r - 1.0) * tilt * inverse * inverse
+        turn[A], turn[B], turn[C] = 0.0, curl, 2.0 * y * curl
+        turn[E], turn[H], turn[W] = -bow * curl, slope / h * curl, -(slope / w + bow * eta) * curl
+        inverse /= scale
+        row[A], row[B], row[C] = inverse, y * inverse, y * y * inverse
+        row[E], row[H], row[W] = -slope * inverse, f * inverse, -slope * eta * inverse
+        for p in range(TERMS):
+            right[j, p] += weight * (r * row[p] + turn[p])
+            for q in range(p + 1):
+                matrix[j, p, q] += weight * row[p] * row[q]
+    for p in range(TERMS):
+        for q in range(p):
+            matrix[:, q, p] = matrix[:, p, q]
+    return matrix, right, sums
+
+
+@njit(**OPTIONS)
+def assembled(
+    matrix: Floats, right: Floats, at: Floats, first: NDArray[np.int64], basis: Floats, n: int
+) -> tuple[Floats, Floats]:
+    """The band (6 n, 24) and right side (6 n,) of normal equations for the coefficients of six cubic splines.
+
+    matrix (m, 6, 6), right (m, 6) of m stretches whose terms are `at` (m, 6); first (m,), basis (m, 4): the
+    splines' basis functions there. Unknown 6 i + k is the i-th coefficient of the k-th term.
+    """
+    band, out = np.zeros((TERMS * n, 4 * TERMS)), np.zeros(TERMS * n)
+    for j in range(matrix.shape[0]):
+        for p in range(TERMS):
+            goal = right[j, p]
+            for q in range(TERMS):
+                goal += matrix[j, p, q] * at[j, q]
+            for k in range(4):
+                i = TERMS * (first[j] + k) + p
+                out[i] += basis[j, k] * goal
+                for l in range(4):
+                    for q in range(TERMS):
+                        other = TERMS * (first[j] + l) + q
+                        if other <= i:
+                            band[i, i - other] += basis[j, k] * basis[j, l] * matrix[j, p, q]
+    return band, out
