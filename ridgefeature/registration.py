@@ -13,6 +13,7 @@ from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
+from ridgefeature.joint_stations import refitted
 from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
 from ridgefeature.march import Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
@@ -73,8 +74,11 @@ def register(
         _track(full.thinned(_ROUGH_POINTS), full, pick, extent, hints, settings, progress), pick, hints
     )
     templates = _with_distances(track.templates, grid)
+    stations = lay_out(templates, settings, track.closed)
+    if settings.measure == "residual":
+        stations, _ = refitted(grid, stations, templates[0].section, track.closed, settings)
     return Ridge(
-        **vars(lay_out(templates, settings, track.closed)),
+        **vars(stations),
         section=templates[0].section,
         templates=templates,
         stop=track.stop,

@@ -59,7 +59,7 @@ def interpolating_curve(sites: Array, points: Array) -> Curve:
     return Curve(poles, knots, degree)
 
 
-def _arc_lengths(path: Curve, sites: Array, per_site: int = 32) -> tuple[Array, Array]:
+def arc_lengths(path: Curve, sites: Array, per_site: int = 32) -> tuple[Array, Array]:
     """Parameters, dense between the sites, and the arc length of the curve up to each (Simpson's rule)."""
     fine = np.interp(np.arange(per_site * (len(sites) - 1) + 1) / per_site, np.arange(len(sites)), sites)
     speed = np.linalg.norm(path(fine, 1), axis=1)
@@ -110,7 +110,7 @@ def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = 
         **_sizes(templates, way.spread(s), way.curvature(s), settings),
         curvature=way.spread(np.clip(s, way.at[0], way.at[-1])) @ [q.base[2] for q in templates],
     )
-    return _meeting(found) if closed else found
+    return meeting(found) if closed else found
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ def _open_path(templates: tuple[Template, ...]) -> _Path:
     )
     parameters = _chord_lengths(sites)
     path = interpolating_curve(parameters, sites)
-    fine, lengths = _arc_lengths(path, parameters)
+    fine, lengths = arc_lengths(path, parameters)
     at = np.interp(parameters[1:-1], fine, lengths)
     return _Path(path, fine, lengths, at, np.array([abs(t.trend[0]) for t in templates]), False)
 
@@ -173,7 +173,7 @@ def _ring(templates: tuple[Template, ...]) -> _Path:
     parameters = _chord_lengths(sites)
     knots, inverse = periodic_interpolation(parameters)
     path = Curve(inverse @ sites, knots, 3)
-    fine, lengths = _arc_lengths(path, parameters)
+    fine, lengths = arc_lengths(path, parameters)
     at = np.interp(parameters, fine, lengths)
     return _Path(path, fine, lengths, at, np.array([abs(t.trend[0]) for t in round_again]), True)
 
@@ -189,7 +189,7 @@ def _folded(matrix: Array) -> Array:
     return out
 
 
-def _meeting(stations: Stations) -> Stations:
+def meeting(stations: Stations) -> Stations:
     """The stations with the last one the first again, to the last bit."""
     changes = {}
     for name in (f.name for f in fields(Stations) if f.name != "arc_length"):
@@ -214,13 +214,16 @@ def _sizes(
     sign = 1.0 if np.median(heights) > 0 else -1.0
     height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
     height_std, width_std = np.sqrt(spread**2 @ std**2).T
-    border = np.minimum(
-        (0.5 + settings.border) * width, np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width)
-    )
     return {
         "height": height,
         "width": width,
         "height_std": height_std,
         "width_std": width_std,
-        "border": border,
+        "border": border_of(width, curvature, settings),
     }
+
+
+def border_of(width: Array, curvature: Array, settings: Settings) -> Array:
+    """(k,) where the flanks end: less far out where the path bends, by its curvature (k,)."""
+    inner = np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width)
+    return np.minimum((0.5 + settings.border) * width, inner)

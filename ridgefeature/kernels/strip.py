@@ -33,14 +33,13 @@ def rectified(
     normal: Floats,
     curvature: Floats,
     reach: Floats,
-    low: Floats,
-    high: Floats,
+    tall: Floats,
     first: int,
 ) -> Floats:
     """Coordinates (m, 3) of those points (n, 3) that lie between the first and the last node.
 
-    All in the points' frame. reach (nodes,): how far to either side; low, high (nodes,): how far below and
-    above the base. The nodes are numbered from `first` on. Of several places that a point may have the one
+    All in the points' frame. reach (nodes,): how far to either side; tall (nodes,): how far above and below
+    the base. The nodes are numbered from `first` on. Of several places that a point may have the one
     nearest to the path is taken.
     """
     n = origin.shape[0]
@@ -93,7 +92,7 @@ def rectified(
                 radius = math.sqrt(bend * bend * side * side + room * room)
                 side, over = math.atan2(bend * side, room) / bend, (1.0 - radius) / bend
             far = v * reach[j] + u * reach[j + 1]
-            if abs(side) > far or over < v * low[j] + u * low[j + 1] or over > v * high[j] + u * high[j + 1]:
+            if abs(side) > far or abs(over) > v * tall[j] + u * tall[j + 1]:
                 continue
             if best < 0.0 or abs(side) < best:
                 best = abs(side)

@@ -1,0 +1,108 @@
+"""Stations of a ridge that was fitted as a whole."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.basis import periodic_interpolation
+from ridgefeature.bspline import Curve
+from ridgefeature.grid import Grid
+from ridgefeature.joint import Joint, fit_whole
+from ridgefeature.kernels.strip import A, B, C, E, H, W
+from ridgefeature.path_frame import path_frame, unit
+from ridgefeature.section import Section
+from ridgefeature.settings import Settings
+from ridgefeature.smoothing import basis_at
+from ridgefeature.stations import Stations, arc_lengths, border_of, interpolating_curve, meeting
+
+Array = NDArray[np.float64]
+
+_PATHS = 2
+"""Times the path is laid where the last fit found it."""
+
+
+def refitted(
+    grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings
+) -> tuple[Stations, Joint | None]:
+    """The stations fitted again as a whole; as they were, and None, where there are too few points."""
+    joint, weights = None, None
+    for _ in range(_PATHS):
+        new = fit_whole(grid, path_frame(stations, closed), section, settings, weights)
+        if new is None:
+            break
+        joint, weights = new, new.smooth.weights
+        stations = stations_of(joint, len(stations.arc_length), settings)
+    return stations, joint
+
+
+def stations_of(joint: Joint, count: int, settings: Settings) -> Stations:
+    """Evenly spaced stations, `count` of them; of a ring the last is the first again."""
+    path = joint.path
+    closed = path.overlap > 0
+    start, end = path.at[0] + path.overlap, path.at[-1] - path.overlap
+    s = np.linspace(start, end, 2 * count - 1)
+    spine = _places(joint, s)[0]
+    chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spine, axis=0), axis=1))])
+    if closed:
+        spine[-1] = spine[0]
+        knots, inverse = periodic_interpolation(chords)
+        curve = Curve(inverse @ spine, knots, 3)
+    else:
+        curve = interpolating_curve(chords, spine)
+    fine, lengths = arc_lengths(curve, chords, 8)
+    even = np.linspace(0.0, lengths[-1], count)
+    t = np.interp(even, lengths, fine)
+    where = np.interp(t, chords, s)
+    _, normal, values, stds = _places(joint, where)
+    tangent = unit(curve(t, 1))
+    normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    bend = np.abs((np.gradient(tangent, even, axis=0) * np.cross(normal, tangent)).sum(axis=1))
+    curvature, height, width = values.T
+    found = Stations(
+        arc_length=even,
+        spine=curve(t),
+        tangent=tangent,
+        normal=normal,
+        height=height,
+        width=width,
+        height_std=stds[:, 0],
+        width_std=stds[:, 1],
+        border=border_of(width, bend, settings),
+        curvature=curvature,
+    )
+    return meeting(found) if closed else found
+
+
+def _places(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
+    """Spine (k, 3), normal (k, 3), curvature, height and width (k, 3), standard deviations (k, 2) of these two.
+
+    s (k,): arc lengths of the path that the ridge was fitted along.
+    """
+    path = joint.path
+    if not path.overlap:
+        return _unblended(joint, s)
+    # A ring was fitted beyond its seam at both ends: there one end fades into the other.
+    length = float(path.at[-1] - path.at[0]) - 2.0 * path.overlap
+    signed = (s + 0.5 * length) % length - 0.5 * length
+    near = np.abs(signed) < path.overlap
+    low = np.where(near, signed, s % length)
+    x = np.clip(0.5 * (signed / path.overlap + 1.0), 0.0, 1.0)
+    share = np.where(near, x**3 * (10 - 15 * x + 6 * x * x), 1.0)[:, None]
+    one, other = _unblended(joint, low), _unblended(joint, np.where(near, signed + length, low))
+    blend = [share * a + (1.0 - share) * b for a, b in zip(one, other, strict=True)]
+    return blend[0], blend[1], blend[2], blend[3]
+
+
+def _unblended(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
+    path = joint.path
+    place = np.interp(s, path.at, path.knots)
+    first, basis = basis_at(path.coefficients, place)
+    a, b, c, e, h, w = (basis[:, :, None] * joint.smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1).T
+    origin, left, normal, bend = path.between(s)
+    tilt = b + (bend + 2.0 * c) * e
+    rise = a + b * e + (0.5 * bend + c) * e * e
+    spine = origin + e[:, None] * left + rise[:, None] * normal
+    up = unit(normal - tilt[:, None] * left)
+    stds = [joint.smooth.deviations(first, basis, term) for term in (H, W)]
+    return spine, up, np.column_stack([bend + 2.0 * c, h, w]), np.column_stack(stds)

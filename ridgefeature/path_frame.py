@@ -1,0 +1,133 @@
+"""Coordinates of scan points along a ridge: nodes of its path with frames, and the points between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.grid import Grid, points_in_box
+from ridgefeature.kernels.strip import rectified
+from ridgefeature.merge import along
+from ridgefeature.stations import Stations
+
+Array = NDArray[np.float64]
+
+_NODES_A_WIDTH = 10
+_KNOTS_A_WIDTH = 2.0
+_FEWEST_SPANS = 4
+_TOGETHER = 8
+"""Nodes between which points are looked up together."""
+_OVERLAP = 1.5
+"""How far a ring's path runs on beyond its seam at both ends, in widths."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathFrame:
+    """A path at n nodes that are evenly spaced in local widths; of a ring it runs on beyond the seam.
+
+    at (n,): arc length; knots (n,): place among the knots of splines along the path, from 0; origin, tangent,
+    left, normal (n, 3); curvature (n,) of the base across; height, width (n,) as far as they are known.
+    """
+
+    at: Array
+    knots: Array
+    origin: Array
+    tangent: Array
+    left: Array
+    normal: Array
+    curvature: Array
+    height: Array
+    width: Array
+    overlap: float = 0.0
+    """Arc length by which a ring runs on; 0: an open path."""
+
+    @property
+    def coefficients(self) -> int:
+        """How many a spline along the path has."""
+        return round(float(self.knots[-1])) + 3
+
+    @property
+    def tall(self) -> Array:
+        """(n,) how far above and below the base points are looked at."""
+        return 2.0 * np.abs(self.height) + 0.25 * self.width
+
+    def between(self, s: Array) -> tuple[Array, Array, Array, Array]:
+        """Origin, left, normal (k, 3) and curvature (k,) at arc lengths, as kernels.strip has them."""
+        i = np.clip(np.searchsorted(self.at, s, side="right") - 1, 0, len(self.at) - 2)
+        u = ((s - self.at[i]) / (self.at[i + 1] - self.at[i]))[:, None]
+        v = 1.0 - u
+        chord = self.origin[i + 1] - self.origin[i]
+        step = np.linalg.norm(chord, axis=1, keepdims=True)
+        origin = (
+            self.origin[i]
+            + u * u * (3.0 - 2.0 * u) * chord
+            + step * (u * v * v * self.tangent[i] - u * u * v * self.tangent[i + 1])
+        )
+        left, normal = (unit(v * x[i] + u * x[i + 1]) for x in (self.left, self.normal))
+        return origin, left, normal, (v * self.curvature[i, None] + u * self.curvature[i + 1, None])[:, 0]
+
+
+def path_frame(stations: Stations, closed: bool) -> PathFrame:
+    """The path of stations with its frames."""
+    s, length = stations.arc_length, float(stations.arc_length[-1])
+    overlap = min(_OVERLAP * float(stations.width.max()), 0.5 * length) if closed else 0.0
+    fine = np.linspace(-overlap, length + overlap, 20 * len(s))
+    local = np.interp(fine % length if closed else fine, s, stations.width)
+    steps = 0.5 * np.diff(fine) * (1 / local[1:] + 1 / local[:-1])
+    widths = np.concatenate([[0.0], np.cumsum(steps)])
+    spans = max(int(np.ceil(_KNOTS_A_WIDTH * widths[-1])), _FEWEST_SPANS)
+    nodes = max(int(np.ceil(_NODES_A_WIDTH * widths[-1])), _NODES_A_WIDTH) + 1
+    even = np.linspace(0.0, widths[-1], nodes)
+    at = np.interp(even, widths, fine)
+    where = at % length if closed else at
+    spread = along(s, np.eye(len(s)), where, closed=closed)
+    tangent = unit(along(s, stations.spine, where, derivative=1, closed=closed))
+    normal = spread @ stations.normal
+    normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    return PathFrame(
+        at,
+        even / widths[-1] * spans,
+        spread @ stations.spine,
+        tangent,
+        np.cross(normal, tangent),
+        normal,
+        spread @ stations.curvature,
+        spread @ stations.height,
+        np.maximum(spread @ stations.width, 0.3 * stations.width.min()),
+        overlap,
+    )
+
+
+def points_along(grid: Grid, path: PathFrame, reach: Array) -> Array:
+    """Coordinates (m, 3) of the points up to `reach` (n,) from the path: s in nodes, y and z (kernels.strip)."""
+    last = len(path.at) - 1
+    parts = [_between(grid, path, reach, i, min(i + _TOGETHER, last)) for i in range(0, last, _TOGETHER)]
+    return np.concatenate(parts)
+
+
+def _between(grid: Grid, path: PathFrame, reach: Array, first: int, last: int) -> Array:
+    own, middle = slice(first, last + 1), (first + last) // 2
+    axes = np.stack([path.tangent[middle], path.left[middle], path.normal[middle]])
+    origin = (path.origin[own] - path.origin[middle]) @ axes.T
+    tangent, left, normal = (x[own] @ axes.T for x in (path.tangent, path.left, path.normal))
+    bend, tall, far = path.curvature[own], path.tall[own], reach[own]
+    corners = np.concatenate(
+        [
+            origin
+            + (y * far * (1.0 - z * tall * bend))[:, None] * left
+            + (z * tall + 0.5 * bend * (y * far) ** 2)[:, None] * normal
+            for y in (-1.0, 0.0, 1.0)
+            for z in (-1.0, 1.0)
+        ]
+    )
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre, half = 0.5 * (low + high), 0.505 * (high - low) + 1e-9 * far.max()
+    found = points_in_box(grid, path.origin[middle] + centre @ axes, axes, half, check=False)
+    return rectified(found, origin - centre, tangent, left, normal, bend, far, tall, first)
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors (n, 3) at length 1."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
