@@ -16,7 +16,10 @@ from ridgefeature.smoothing import Smooth, basis_at, smoothest
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 4
+_ROUNDS = 3
+_FIRST_MIXTURE, _NEXT_MIXTURE = 15, 3
+_ENOUGH = 5000
+"""Points that tell the noise well enough to begin with."""
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
 _SOME_STRAYS = 0.05
@@ -67,10 +70,10 @@ def fit_whole(
     first, basis = basis_at(path.coefficients, path.knots)
     middle, wanted = 0.5 * (path.knots[1:] + path.knots[:-1]), _wanted(path)
     even, inflation = _evenness(points, terms, section), 1.0
+    scale, strays = _first_noise(points, terms, section, h, w)
     for n in range(_ROUNDS):
         distances = offsets(points, terms, section.table)
-        scale = max(1.4826 * float(np.median(np.abs(distances))), 1e-4 * h)
-        scale, strays, density = mixture(distances, scale, _SOME_STRAYS, 4.0 * h + 0.5 * w, 20)
+        scale, strays, density = mixture(distances, scale, strays, 4.0 * h + 0.5 * w, _NEXT_MIXTURE)
         matrix, right, sums = information(points, terms, section.table, scale, density, even)
         gain = sums[3] ** 2 / (sums[2] * sums[1])
         if n >= _ROUNDS - 2:
@@ -82,6 +85,14 @@ def fit_whole(
         terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
         terms[:, W] = np.clip(terms[:, W], 0.5 * path.width, 2.0 * path.width)
     return Joint(path, smooth, terms, points, scale, strays, inflation)
+
+
+def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> tuple[float, float]:
+    """Noise scale and share of strays, from some of the points."""
+    distances = offsets(points[:: 1 + len(points) // _ENOUGH], terms, section.table)
+    scale = max(1.4826 * float(np.median(np.abs(distances))), 1e-4 * h)
+    found = mixture(distances, scale, _SOME_STRAYS, 4.0 * h + 0.5 * w, _FIRST_MIXTURE)
+    return found[0], found[1]
 
 
 def _wanted(path: PathFrame) -> Array:

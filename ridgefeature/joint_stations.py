@@ -41,7 +41,7 @@ def stations_of(joint: Joint, count: int, settings: Settings) -> Stations:
     path = joint.path
     closed = path.overlap > 0
     start, end = path.at[0] + path.overlap, path.at[-1] - path.overlap
-    s = np.linspace(start, end, 2 * count - 1)
+    s = np.linspace(start, end, count)
     spine = _places(joint, s)[0]
     chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spine, axis=0), axis=1))])
     if closed:

@@ -19,8 +19,8 @@ Floats = NDArray[np.float64]
 
 ORDERS = (3, 2, 1, 3, 2, 2)
 """Order of the differences that are kept small, of each term: offsets follow a smooth curvature."""
-_ROUNDS = 30
-_SAME = 0.02
+_ROUNDS = 5
+_SAME = 0.1
 _LEAST_RIDGE = 1e-9
 
 
@@ -97,7 +97,6 @@ def smoothest(
         found = banded.solve(factored, pull).reshape(n, TERMS)
         inverse = banded.inverse_band(factored)
         new = np.minimum(most, [_weight(lam[k], penalties[k], found[:, k], inverse, wanted[k]) for k in range(TERMS)])
-        print(lam, new) if 0 else None
         done = np.abs(np.log(new / lam)).max() < _SAME
         lam = new
         if done:
