@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.free_section import FREE, SPANS, WIDER, free_section
 from ridgefeature.grid import Grid
 from ridgefeature.kernels.strip import TERMS, A, B, C, E, H, W, information, mixture, offsets
 from ridgefeature.path_frame import PathFrame, points_along
@@ -16,7 +17,7 @@ from ridgefeature.smoothing import Smooth, basis_at, smoothest
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3
+_ROUNDS = 4
 _FIRST_MIXTURE, _NEXT_MIXTURE = 15, 3
 _ENOUGH = 5000
 """Points that tell the noise well enough to begin with."""
@@ -38,6 +39,7 @@ class Joint:
     path: PathFrame
     smooth: Smooth
     terms: Array
+    section: Section
     points: Array
     scale: float
     """Noise: standard deviation of the distances of points that are no strays."""
@@ -45,6 +47,14 @@ class Joint:
     """Share of points that are strays."""
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
+
+    def between_feet(self, section: Section, middle: float, breadth: float) -> Joint:
+        """The same with a section whose feet lie so far apart, about such a middle, in widths of the old one."""
+        change = np.eye(TERMS)
+        change[E, W], change[W, W] = middle, breadth
+        return replace(
+            self, section=section, terms=self.terms @ change.T, smooth=self.smooth.changed(change)
+        )
 
     def deviations(self, term: int) -> Array:
         """(n,) standard deviations of a term at the nodes."""
@@ -83,8 +93,26 @@ def fit_whole(
         smooth = smoothest(gain * matrix, gain * right, at, middle, path.coefficients, wanted, weights)
         weights = smooth.weights
         terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
-        terms[:, W] = np.clip(terms[:, W], 0.5 * path.width, 2.0 * path.width)
-    return Joint(path, smooth, terms, points, scale, strays, inflation)
+        terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
+        if n < _ROUNDS - 1 and settings.section in ("auto", "learned"):
+            section, terms = _shaped(points, terms, section, (scale, density, even), inflation)
+    return Joint(path, smooth, terms, section, points, scale, strays, inflation)
+
+
+def _shaped(
+    points: Array, terms: Array, section: Section, noise: tuple[float, float, float], inflation: float
+) -> tuple[Section, Array]:
+    """The section and terms, or a free section and its terms where that is better beyond doubt."""
+    price, best, kept = np.log(len(points)), 0.0, (section, terms)
+    wider = 1.0 if section.name == FREE else WIDER
+    for spans in SPANS:
+        found = free_section(points, terms, section, noise, spans, wider)
+        if found is None:
+            continue
+        net = found.gain / inflation - price * found.freedom
+        if net > best:
+            best, kept = net, (found.section, found.terms)
+    return kept
 
 
 def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
+from ridgefeature.free_section import FREE, trimmed
 from ridgefeature.grid import Grid
 from ridgefeature.joint import Joint, fit_whole
 from ridgefeature.kernels.strip import A, B, C, E, H, W
@@ -18,6 +19,7 @@ from ridgefeature.stations import Stations, arc_lengths, border_of, interpolatin
 
 Array = NDArray[np.float64]
 
+_NARROWEST = 0.2
 _PATHS = 2
 """Times the path is laid where the last fit found it."""
 
@@ -31,7 +33,10 @@ def refitted(
         new = fit_whole(grid, path_frame(stations, closed), section, settings, weights)
         if new is None:
             break
-        joint, weights = new, new.smooth.weights
+        joint, weights, section = new, new.smooth.weights, new.section
+        if section.name == FREE:
+            section, middle, breadth = trimmed(section)
+            joint = joint.between_feet(section, middle, breadth)
         stations = stations_of(joint, len(stations.arc_length), settings)
     return stations, joint
 
@@ -59,6 +64,7 @@ def stations_of(joint: Joint, count: int, settings: Settings) -> Stations:
     normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
     bend = np.abs((np.gradient(tangent, even, axis=0) * np.cross(normal, tangent)).sum(axis=1))
     curvature, height, width = values.T
+    width = np.maximum(width, _NARROWEST * np.median(width))
     found = Stations(
         arc_length=even,
         spine=curve(t),

@@ -74,12 +74,13 @@ def register(
         _track(full.thinned(_ROUGH_POINTS), full, pick, extent, hints, settings, progress), pick, hints
     )
     templates = _with_distances(track.templates, grid)
-    stations = lay_out(templates, settings, track.closed)
+    stations, section = lay_out(templates, settings, track.closed), templates[0].section
     if settings.measure == "residual":
-        stations, _ = refitted(grid, stations, templates[0].section, track.closed, settings)
+        stations, joint = refitted(grid, stations, section, track.closed, settings)
+        section = section if joint is None else joint.section
     return Ridge(
         **vars(stations),
-        section=templates[0].section,
+        section=section,
         templates=templates,
         stop=track.stop,
         closed=track.closed,

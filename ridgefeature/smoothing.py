@@ -47,6 +47,34 @@ class Smooth:
                 total += basis[:, k] * basis[:, m] * self.covariance[high, high - low]
         return total
 
+    def changed(self, change: Floats) -> Smooth:
+        """The same for other terms, `change` (6, 6) times these."""
+        n, m = self.covariance.shape
+        covariance = np.zeros_like(self.covariance)
+        blocks = np.zeros((n // TERMS, m // TERMS, TERMS, TERMS))
+        for i in range(TERMS):
+            for k in range(m):
+                whole = np.arange(i, n, TERMS)
+                other = whole - k
+                ok = other >= 0
+                step = (whole // TERMS - other // TERMS)[ok]
+                near = step < m // TERMS
+                blocks[whole[ok][near] // TERMS, step[near], i, other[ok][near] % TERMS] = self.covariance[
+                    whole[ok][near], k
+                ]
+        # Within one place the band holds but the lower half.
+        upper = np.triu_indices(TERMS, 1)
+        blocks[:, 0][:, upper[0], upper[1]] = np.swapaxes(blocks[:, 0], 1, 2)[:, upper[0], upper[1]]
+        blocks = np.einsum("ij,nbjk,lk->nbil", change, blocks, change)
+        for i in range(TERMS):
+            for k in range(m):
+                whole = np.arange(i, n, TERMS)
+                other = whole - k
+                ok = (other >= 0) & (whole // TERMS - other // TERMS < m // TERMS)
+                w, o = whole[ok], other[ok]
+                covariance[w, k] = blocks[w // TERMS, w // TERMS - o // TERMS, i, o % TERMS]
+        return Smooth(self.coefficients @ change.T, covariance, self.weights)
+
 
 def even_knots(n: int) -> Floats:
     """Knots (n + 4,) of n cubic splines on [0, n - 3], one a unit, running on beyond both ends."""

@@ -252,3 +252,72 @@ def assembled(
                         if other <= i:
                             band[i, i - other] += basis[j, k] * basis[j, l] * matrix[j, p, q]
     return band, out
+
+
+@njit(**OPTIONS)
+def section_sums(
+    points: Floats,
+    terms: Floats,
+    table: Floats,
+    scale: float,
+    stray: float,
+    even: float,
+    spans: int,
+    wider: float,
+) -> tuple[Floats, Floats]:
+    """Normal equations, in units of the noise, of a section and of the base's offset, tilt and curvature.
+
+    The section is a cubic spline on so many equal spans over `wider` widths: its coefficients (spans + 3,),
+    heights in apex heights; the last three unknowns change the base everywhere, in powers of y. The matrix is
+    (spans + 6, spans + 6).
+    """
+    constant, linear, quadratic, cubic = split(table)
+    n = spans + 6
+    matrix, right = np.zeros((n, n)), np.zeros(n)
+    index, row = np.empty(7, np.int64), np.empty(7)
+    for k in range(3):
+        index[4 + k] = spans + 3 + k
+    for i in range(points.shape[0]):
+        j = min(np.int64(points[i, 0]), terms.shape[0] - 2)
+        u = points[i, 0] - j
+        v = 1.0 - u
+        y = points[i, 1]
+        a, b, c = (
+            v * terms[j, A] + u * terms[j + 1, A],
+            v * terms[j, B] + u * terms[j + 1, B],
+            v * terms[j, C] + u * terms[j + 1, C],
+        )
+        e, h, w = (
+            v * terms[j, E] + u * terms[j + 1, E],
+            v * terms[j, H] + u * terms[j + 1, H],
+            v * terms[j, W] + u * terms[j + 1, W],
+        )
+        eta = (y - e) / w
+        f, slope, bow = _section(eta, constant, linear, quadratic, cubic)
+        slope, bow = slope * h / w, bow * h / (w * w)
+        tilt = b + 2.0 * c * y + slope
+        inverse = 1.0 / math.sqrt(1.0 + tilt * tilt)
+        bias = 0.5 * scale * (2.0 * c + bow) * inverse * (1.0 + 2.0 * even * (1.0 - inverse * inverse))
+        bias = min(max(bias, -0.5), 0.5)
+        inverse /= scale
+        goal = (points[i, 2] - a - y * (b + c * y)) * inverse - bias
+        r = goal - h * f * inverse
+        weight = 1.0 / (1.0 + stray / (inverse * scale) * math.exp(min(0.5 * r * r, 50.0)))
+        place = (eta / wider + 0.5) * spans
+        span = min(max(np.int64(math.floor(place)), 0), spans - 1)
+        t = place - span
+        inside = 1.0 if 0.0 <= t <= 1.0 else 0.0
+        s = 1.0 - t
+        row[0] = s * s * s / 6.0
+        row[1] = (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0
+        row[2] = (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0
+        row[3] = t * t * t / 6.0
+        for k in range(4):
+            index[k] = span + k
+            row[k] *= inside * h * inverse
+        row[4], row[5], row[6] = inverse, y * inverse, y * y * inverse
+        for k in range(7):
+            right[index[k]] += weight * goal * row[k]
+            for m in range(7):
+                matrix[index[k], index[m]] += weight * row[k] * row[m]
+    return matrix, right
