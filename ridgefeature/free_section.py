@@ -48,6 +48,8 @@ def free_section(
     It spans `wider` widths: where its feet are `trimmed` tells once it is final.
     """
     matrix, right = section_sums(points, terms, section.table, *noise, spans, wider)
+    if not (np.isfinite(matrix).all() and (np.diagonal(matrix)[-3:] > 0).all()):
+        return None
     found, freedom = _smoothest(matrix, right, spans)
     raised = found[3:spans]
     if not raised.max() > 0:
@@ -82,14 +84,15 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float]:
     # Feet: the section ends flat.
     pinned = np.zeros(len(matrix))
     pinned[[0, 1, 2, n - 3, n - 2, n - 1]] = 1e3 * np.diagonal(matrix)[:n].max()
-    lam = 1e-3 * float(np.diagonal(matrix)[:n].mean())
+    size = float(np.diagonal(matrix)[:n].mean())
+    lam = 1e-3 * size
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
         inverse = np.linalg.inv(matrix + lam * penalty + ridge)
         found = inverse @ right
         rough = float(((d @ found) ** 2).sum())
         free = max(n - 2 - lam * float((penalty * inverse).sum()), 1e-2)
-        new = float(np.clip(free / max(rough, 1e-300), 1e-2 * lam, 1e2 * lam))
+        new = float(np.clip(free / max(rough, 1e-300), max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)))
         done = abs(np.log(new / lam)) < 0.05
         lam = new
         if done:

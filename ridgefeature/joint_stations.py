@@ -20,6 +20,7 @@ from ridgefeature.stations import Stations, arc_lengths, border_of, interpolatin
 Array = NDArray[np.float64]
 
 _NARROWEST = 0.2
+_FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _PATHS = 2
 """Times the path is laid where the last fit found it."""
 
@@ -31,7 +32,7 @@ def refitted(
     joint, weights = None, None
     for _ in range(_PATHS):
         new = fit_whole(grid, path_frame(stations, closed), section, settings, weights)
-        if new is None:
+        if new is None or not _sound(new):
             break
         joint, weights, section = new, new.smooth.weights, new.section
         if section.name == FREE:
@@ -39,6 +40,18 @@ def refitted(
             joint = joint.between_feet(section, middle, breadth)
         stations = stations_of(joint, len(stations.arc_length), settings)
     return stations, joint
+
+
+def _sound(joint: Joint) -> bool:
+    """Whether a fit is still about the ridge that it began with."""
+    path, terms = joint.path, joint.terms
+    if not (np.isfinite(terms).all() and np.isfinite(joint.smooth.covariance).all()):
+        return False
+    aside = np.abs(terms[:, E]) < _FAR * path.width
+    level = np.abs(terms[:, A]) < _FAR * path.width + np.abs(path.height)
+    grown = terms[:, H] / np.where(path.height == 0, 1.0, path.height)
+    size = (grown > 1 / _GROWN) & (grown < _GROWN)
+    return float((aside & level & size).mean()) > _MOSTLY
 
 
 def stations_of(joint: Joint, count: int, settings: Settings) -> Stations:

@@ -84,7 +84,7 @@ def rectified(
             side = (px * lx + py * ly + pz * lz) / math.sqrt(lx * lx + ly * ly + lz * lz)
             over = (px * nx + py * ny + pz * nz) / math.sqrt(nx * nx + ny * ny + nz * nz)
             bend = v * curvature[j] + u * curvature[j + 1]
-            if abs(bend) > 1e-12:
+            if abs(bend) * (abs(side) + abs(over)) > 1e-9:
                 # Unrolled: the base is an arc of a circle, heights are along its radii.
                 room = 1.0 - bend * over
                 if room <= 0.2:
@@ -199,8 +199,9 @@ def information(
             v * terms[j, W] + u * terms[j + 1, W],
         )
         eta = (y - e) / w
-        f, slope, bow = _section(eta, constant, linear, quadratic, cubic)
-        slope, bow = slope * h / w, bow * h / (w * w)
+        f, rate, bow = _section(eta, constant, linear, quadratic, cubic)
+        rate /= w
+        slope, bow = h * rate, bow * h / (w * w)
         tilt = b + 2.0 * c * y + slope
         inverse = 1.0 / math.sqrt(1.0 + tilt * tilt)
         # Noise along a bent surface leads off it, to the outside.
@@ -214,7 +215,7 @@ def information(
         # The distance also changes with the slope, by which heights are divided.
         curl = (r * r - 1.0) * tilt * inverse * inverse
         turn[A], turn[B], turn[C] = 0.0, curl, 2.0 * y * curl
-        turn[E], turn[H], turn[W] = -bow * curl, slope / h * curl, -(slope / w + bow * eta) * curl
+        turn[E], turn[H], turn[W] = -bow * curl, rate * curl, -(slope / w + bow * eta) * curl
         inverse /= scale
         row[A], row[B], row[C] = inverse, y * inverse, y * y * inverse
         row[E], row[H], row[W] = -slope * inverse, f * inverse, -slope * eta * inverse
