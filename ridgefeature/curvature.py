@@ -12,7 +12,6 @@ from ridgefeature.improve import floor, improve, loss_of
 from ridgefeature.kernels import chain
 from ridgefeature.kernels.base import flattened, standing
 from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
-from ridgefeature.kernels.evidence import explained
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -136,16 +135,18 @@ class Ahead:
             return template.changed(base=np.zeros(3)) if template.base.any() else template
         if template.base.any():
             return template.changed(base=both.mean)
-        # A curved base that shall explain a template for the first time must do so better than a flat one.
+        # The first time a curved base must fit better than a flat one, and show the same ridge.
         bent = improve(window, template.changed(base=both.mean), self.settings)
-        return bent if _better(window, bent, template) else template
+        alike = 0.5 < bent.width / template.width < 2.0
+        return bent if alike and less_noisy(bent, template) else template
 
 
-def _better(window: Window, template: Template, other: Template) -> bool:
-    """Whether a template is about as wide as another of the same ridge, and leaves less unexplained."""
-    if template.status in ("failed", "no data") or not 0.5 < template.width / other.width < 2.0:
-        return False
-    return bool(explained(window(template), *template.shape) > explained(window(other), *other.shape))
+def less_noisy(bent: Template, flat: Template) -> bool:
+    """Whether a template on a curved base leaves smaller residuals than one on a flat base.
+
+    Not a larger share: a base that bends the wrong way makes a higher ridge, and more to explain.
+    """
+    return bent.status not in ("failed", "no data") and bent.scale < flat.scale
 
 
 def _chi_square(degrees: int, chance: float) -> float:

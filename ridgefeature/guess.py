@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvature import improve_on_base
+from ridgefeature.curvature import improve_on_base, less_noisy
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
@@ -144,13 +144,10 @@ def guess(
 
 
 def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:
-    """The start improved on a flat base, or on a curved one where that is told and explains more a point."""
+    """The start improved on a flat base, or on a curved one where that is told and fits better."""
     flat = improve(window, start, settings)
     curved = improve_on_base(window, start, settings)
-    if (
-        curved is None
-        or _score(window, curved, pick) * flat.points <= _score(window, flat, pick) * curved.points
-    ):
+    if curved is None or not less_noisy(curved, flat) or _score(window, curved, pick) <= 0:
         return flat
     return curved
 

@@ -71,8 +71,8 @@ class Settings:
     widest: float = _setting(0.5, "width of the widest ridge, in parts of the scan's extent")
     steepest: float = _setting(4.0, "height of the steepest ridge")
     base_chance: float = _setting(
-        0.5,
-        "chance at which a flat base is taken for a curved one, such as 0.001; 0.5 or more: bases are flat",
+        1e-3,
+        "chance at which a flat base is taken for a curved one; 0.5 or more: bases are flat",
     )
     look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")
     max_templates: int = _setting(500, "templates in all")

@@ -6,6 +6,7 @@ import numpy as np
 
 from ridgefeature.improve import FEWEST_POINTS
 from ridgefeature.kernels.alternatives import advantage
+from ridgefeature.kernels.base import on_base
 from ridgefeature.march import GOES_ON, Track
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -21,13 +22,12 @@ def distinct(window: Window, template: Template, settings: Settings) -> float:
     if len(points) < FEWEST_POINTS or template.height == 0:
         return 0.0
     scale = max(template.scale, _LEAST_CONTRAST * abs(template.height))
-    return float(
-        min(
-            advantage(
-                points, *template.shape, 0.5 * template.length, template.half_breadth, scale, settings.tuning
-            )
-        )
-    )
+    size = 0.5 * template.length, template.half_breadth, scale, settings.tuning
+    views = [points]
+    if template.base.any():
+        # On a base that is curved by mistake an edge no longer looks like one.
+        views.append(on_base(points, template.base))
+    return min(min(advantage(points, seen, *template.shape, *size)) for seen in views)
 
 
 def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, settings: Settings) -> str:

@@ -81,13 +81,10 @@ def scan(place, radius, seed=0, length=70.0, half=14.0, n=12000, noise=NOISE, se
     return place(s, y, z, radius) + random.normal(0, noise, (n, 3))
 
 
-CURVED = rf.Settings(base_chance=1e-3)
-
-
 @lru_cache(maxsize=16)
 def registered(name, rate, seed=0) -> rf.Ridge:
     place = BASES[name][0] if name in BASES else plane
-    return rf.register(scan(place, rate * W, seed), at=(0.0, 0.0, H), settings=CURVED)
+    return rf.register(scan(place, rate * W, seed), at=(0.0, 0.0, H))
 
 
 def errors(ridge):
@@ -367,16 +364,16 @@ def test_a_flat_base_has_no_terms():
     assert not ridge.curvature.any()
 
 
-def test_bases_are_flat_unless_a_chance_is_set():
+def test_bases_are_flat_where_that_is_asked():
     points = scan(cylinder_along, 20 * W)
-    flat = rf.register(points, at=(0, 0, H), settings=rf.Settings())
+    flat = rf.register(points, at=(0, 0, H), settings=rf.Settings(base_chance=0.5))
     assert not flat.curvature.any()
     assert errors(flat)[0].mean() > 0.02
 
 
 def test_feet_may_lie_at_different_levels():
     place = Rotation.from_rotvec([0.35, 0, 0])
-    ridge = rf.register(place.apply(scan(plane, 1)), at=place.apply([0, 0, H]), settings=CURVED)
+    ridge = rf.register(place.apply(scan(plane, 1)), at=place.apply([0, 0, H]))
     h, w, *_ = errors(ridge)
     assert abs(h.mean()) < 0.003
     assert abs(w.mean()) < 0.005
@@ -390,7 +387,6 @@ def test_the_base_is_the_same_however_the_scan_is_moved_and_scaled(scale):
     moved = rf.register(
         scale * (turn.apply(scan(helix, 5 * W)) + shift),
         at=scale * (turn.apply([0, 0, H]) + shift),
-        settings=CURVED,
     )
     np.testing.assert_allclose(moved.curvature * scale, ridge.curvature, atol=1e-5)
     np.testing.assert_allclose(moved.height / scale, ridge.height, rtol=1e-4)
@@ -399,9 +395,7 @@ def test_the_base_is_the_same_however_the_scan_is_moved_and_scaled(scale):
 
 def test_the_order_of_the_points_does_not_matter():
     points = scan(sphere, 5 * W)
-    again = rf.register(
-        points[np.random.default_rng(8).permutation(len(points))], at=(0, 0, H), settings=CURVED
-    )
+    again = rf.register(points[np.random.default_rng(8).permutation(len(points))], at=(0, 0, H))
     for name in ("height", "width", "height_std", "curvature", "spine"):
         assert getattr(again, name).tobytes() == getattr(registered("sphere", 5), name).tobytes()
 

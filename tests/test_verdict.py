@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+from reference.flat import ridge_free
 
 import ridgefeature as rf
 from ridgefeature.kernels.alternatives import advantage, powers, robust_loss
@@ -47,7 +54,7 @@ def window(surface, noise: float = 0.05, n: int = 400, seed: int = 0) -> np.ndar
 
 
 def odds(points: np.ndarray, h: float = 2.0, scale: float = 0.1) -> tuple[float, float]:
-    return advantage(points, h, 10.0, FLAT, bell().table, 4.0, 8.0, scale, 5.0)
+    return advantage(points, points, h, 10.0, FLAT, bell().table, 4.0, 8.0, scale, 5.0)
 
 
 @pytest.mark.parametrize("base", [0.0, 0.02, -0.03])
@@ -73,7 +80,7 @@ def test_smooth_surfaces_steps_and_creases_are_explained(surface) -> None:
 
 def test_the_odds_are_the_same_at_every_scale() -> None:
     points = window(lambda x, y: 2 * bell()(y / 10))
-    small = advantage(1e-3 * points, 2e-3, 1e-2, FLAT, bell().table, 4e-3, 8e-3, 1e-4, 5.0)
+    small = advantage(1e-3 * points, 1e-3 * points, 2e-3, 1e-2, FLAT, bell().table, 4e-3, 8e-3, 1e-4, 5.0)
     np.testing.assert_allclose(small, odds(points), rtol=1e-6)
 
 
@@ -101,6 +108,14 @@ def test_there_is_no_ridge_on_surfaces_without_one(kind: str) -> None:
         inner = points[np.hypot(*points[:, :2].T) < 30]
         with pytest.raises(rf.NoRidgeError):
             rf.register(points, at=inner[rng.integers(len(inner))], kind="auto")
+
+
+@pytest.mark.parametrize("seed", [33, 53, 92])
+def test_a_corner_is_no_ridge_on_a_curved_base(seed: int) -> None:
+    """Its two planes no longer look like planes where its base is taken for curved."""
+    points, click = ridge_free("corner", seed)
+    with pytest.raises(rf.NoRidgeError, match="an edge explains it|wide, on"):
+        rf.register(points, at=click, kind="auto")
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,7 @@ def powers(x: Floats, y: Floats, degree: int, spare: int) -> Floats:
 @njit(**OPTIONS)
 def advantage(
     points: Floats,
+    seen: Floats,
     height: float,
     width: float,
     trend: Floats,
@@ -97,13 +98,15 @@ def advantage(
 
     The ridge stands on any base of second degree. The smooth surface is a cubic polynomial; the step or
     crease is two planes that meet, or do not, along the best of 15 lines parallel to the spine. Residuals are
-    across the template's base, in units of `scale`.
+    across the template's base, in units of `scale`. seen (n, 3): the points as the smooth surface and the
+    edge are to explain them, flattened or not.
     """
     n = len(points)
     x, y, z = points[:, 0] / half_length, points[:, 1] / half_breadth, points[:, 2].copy()
     ridge = powers(x, y, 2, 1)
     ridge[:, 6] = (z - residuals(points, height, width, trend, table)) / height
     on_ridge = robust_loss(ridge, z, scale, tuning)
+    x, y, z = seen[:, 0] / half_length, seen[:, 1] / half_breadth, seen[:, 2].copy()
     smooth = robust_loss(powers(x, y, 3, 0), z, scale, tuning)
     planes = powers(x, y, 1, 3)
     edge, best = n * tuning * tuning / 6.0, -1
