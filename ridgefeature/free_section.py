@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix
-from ridgefeature.kernels.strip import A, B, C, E, H, W, section_sums
+from ridgefeature.kernels.strip import A, B, C, H, W, section_sums
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
@@ -92,7 +92,9 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float]:
         found = inverse @ right
         rough = float(((d @ found) ** 2).sum())
         free = max(n - 2 - lam * float((penalty * inverse).sum()), 1e-2)
-        new = float(np.clip(free / max(rough, 1e-300), max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)))
+        new = float(
+            np.clip(free / max(rough, 1e-300), max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size))
+        )
         done = abs(np.log(new / lam)) < 0.05
         lam = new
         if done:

@@ -40,7 +40,9 @@ class Joint:
     smooth: Smooth
     terms: Array
     section: Section
-    points: Array
+    matrix: Array
+    right: Array
+    """(n - 1, 6, 6) and (n - 1, 6) what the points of each stretch say of a change of the terms."""
     scale: float
     """Noise: standard deviation of the distances of points that are no strays."""
     strays: float
@@ -52,9 +54,7 @@ class Joint:
         """The same with a section whose feet lie so far apart, about such a middle, in widths of the old one."""
         change = np.eye(TERMS)
         change[E, W], change[W, W] = middle, breadth
-        return replace(
-            self, section=section, terms=self.terms @ change.T, smooth=self.smooth.changed(change)
-        )
+        return replace(self, section=section, terms=self.terms @ change.T, smooth=self.smooth.changed(change))
 
     def deviations(self, term: int) -> Array:
         """(n,) standard deviations of a term at the nodes."""
@@ -96,7 +96,7 @@ def fit_whole(
         terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
         if n < _ROUNDS - 1 and settings.section in ("auto", "learned"):
             section, terms = _shaped(points, terms, section, (scale, density, even), inflation)
-    return Joint(path, smooth, terms, section, points, scale, strays, inflation)
+    return Joint(path, smooth, terms, section, matrix * gain, right * gain, scale, strays, inflation)
 
 
 def _shaped(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,36 +12,73 @@ from ridgefeature.bspline import Curve
 from ridgefeature.free_section import FREE, trimmed
 from ridgefeature.grid import Grid
 from ridgefeature.joint import Joint, fit_whole
-from ridgefeature.kernels.strip import A, B, C, E, H, W
-from ridgefeature.path_frame import path_frame, unit
+from ridgefeature.kernels.strip import A, E, H, W
+from ridgefeature.path_frame import PathFrame, path_frame, unit
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.smoothing import basis_at
 from ridgefeature.stations import Stations, arc_lengths, border_of, interpolating_curve, meeting
+from ridgefeature.whole_ends import BEYOND, ends_of
 
 Array = NDArray[np.float64]
 
 _NARROWEST = 0.2
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
-_PATHS = 2
-"""Times the path is laid where the last fit found it."""
+_SHORTEST = 1.5
+"""Length in widths of the shortest ridge that is left of one whose data end."""
 
 
 def refitted(
-    grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings
+    grid: Grid,
+    stations: Stations,
+    section: Section,
+    closed: bool,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
 ) -> tuple[Stations, Joint | None]:
-    """The stations fitted again as a whole; as they were, and None, where there are too few points."""
-    joint, weights = None, None
-    for _ in range(_PATHS):
-        new = fit_whole(grid, path_frame(stations, closed), section, settings, weights)
-        if new is None or not _sound(new):
-            break
-        joint, weights, section = new, new.smooth.weights, new.section
-        if section.name == FREE:
-            section, middle, breadth = trimmed(section)
-            joint = joint.between_feet(section, middle, breadth)
-        stations = stations_of(joint, len(stations.arc_length), settings)
-    return stations, joint
+    """The stations fitted again as a whole; as they were, and None, where there are too few points.
+
+    open_ends: which ends may move, further out or back.
+    """
+    first = _fit(grid, path_frame(stations, closed), section, settings, None)
+    if first is None:
+        return stations, None
+    count = len(stations.arc_length)
+    stations = stations_of(first, count, settings)
+    if not closed and any(open_ends):
+        stations = _between_ends(grid, stations, first, open_ends, settings)
+    joint = _fit(grid, path_frame(stations, closed), first.section, settings, first.smooth.weights)
+    if joint is None:
+        return stations, first
+    return stations_of(joint, len(stations.arc_length), settings), joint
+
+
+def _fit(
+    grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None
+) -> Joint | None:
+    """The whole fit along a path, if it is sound, its section between its feet."""
+    joint = fit_whole(grid, path, section, settings, weights)
+    if joint is None or not _sound(joint):
+        return None
+    return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint
+
+
+def _between_ends(
+    grid: Grid, stations: Stations, joint: Joint, open_ends: tuple[bool, bool], settings: Settings
+) -> Stations:
+    """The stations between the ends that all points along the path tell."""
+    length = float(stations.arc_length[-1])
+    far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
+    path = path_frame(stations, False, (far[0], far[1]))
+    fixed = replace(settings, section=joint.section.name)
+    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights)
+    if wide is None or not np.isfinite(wide.terms).all():
+        return stations
+    start, end = ends_of(wide, 0.0, length, open_ends)
+    if (start, end) == (0.0, length) or end - start < _SHORTEST * float(np.median(stations.width)):
+        return stations
+    count = int(np.clip(round((end - start) / length * (len(stations.arc_length) - 1)) + 1, 13, 401))
+    return stations_of(wide, count, settings, (start, end))
 
 
 def _sound(joint: Joint) -> bool:
@@ -54,11 +93,16 @@ def _sound(joint: Joint) -> bool:
     return float((aside & level & size).mean()) > _MOSTLY
 
 
-def stations_of(joint: Joint, count: int, settings: Settings) -> Stations:
-    """Evenly spaced stations, `count` of them; of a ring the last is the first again."""
+def stations_of(
+    joint: Joint, count: int, settings: Settings, between: tuple[float, float] | None = None
+) -> Stations:
+    """Evenly spaced stations, `count` of them; of a ring the last is the first again.
+
+    between: arc lengths of the joint's path, if not all of it.
+    """
     path = joint.path
     closed = path.overlap > 0
-    start, end = path.at[0] + path.overlap, path.at[-1] - path.overlap
+    start, end = between or (float(path.at[0]) + path.overlap, float(path.at[-1]) - path.overlap)
     s = np.linspace(start, end, count)
     spine = _places(joint, s)[0]
     chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spine, axis=0), axis=1))])
@@ -117,7 +161,9 @@ def _unblended(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
     path = joint.path
     place = np.interp(s, path.at, path.knots)
     first, basis = basis_at(path.coefficients, place)
-    a, b, c, e, h, w = (basis[:, :, None] * joint.smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1).T
+    a, b, c, e, h, w = (
+        (basis[:, :, None] * joint.smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1).T
+    )
     origin, left, normal, bend = path.between(s)
     tilt = b + (bend + 2.0 * c) * e
     rise = a + b * e + (0.5 * bend + c) * e * e

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.grid import Grid, points_in_box
+from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.kernels.strip import rectified
 from ridgefeature.merge import along
 from ridgefeature.stations import Stations
 
 Array = NDArray[np.float64]
 
-_NODES_A_WIDTH = 10
+NODES_A_WIDTH = 10
 _KNOTS_A_WIDTH = 2.0
 _FEWEST_SPANS = 4
 _TOGETHER = 8
@@ -69,24 +70,24 @@ class PathFrame:
         return origin, left, normal, (v * self.curvature[i, None] + u * self.curvature[i + 1, None])[:, 0]
 
 
-def path_frame(stations: Stations, closed: bool) -> PathFrame:
-    """The path of stations with its frames."""
+def path_frame(stations: Stations, closed: bool, beyond: tuple[float, float] = (0.0, 0.0)) -> PathFrame:
+    """The path of stations with its frames; beyond: how far it runs on at both ends of an open one."""
     s, length = stations.arc_length, float(stations.arc_length[-1])
     overlap = min(_OVERLAP * float(stations.width.max()), 0.5 * length) if closed else 0.0
-    fine = np.linspace(-overlap, length + overlap, 20 * len(s))
+    fine = np.linspace(-max(overlap, beyond[0]), length + max(overlap, beyond[1]), 20 * len(s))
     local = np.interp(fine % length if closed else fine, s, stations.width)
     steps = 0.5 * np.diff(fine) * (1 / local[1:] + 1 / local[:-1])
     widths = np.concatenate([[0.0], np.cumsum(steps)])
     spans = max(int(np.ceil(_KNOTS_A_WIDTH * widths[-1])), _FEWEST_SPANS)
-    nodes = max(int(np.ceil(_NODES_A_WIDTH * widths[-1])), _NODES_A_WIDTH) + 1
+    nodes = max(int(np.ceil(NODES_A_WIDTH * widths[-1])), NODES_A_WIDTH) + 1
     even = np.linspace(0.0, widths[-1], nodes)
     at = np.interp(even, widths, fine)
-    where = at % length if closed else at
+    where = at % length if closed else np.clip(at, 0.0, length)
     spread = along(s, np.eye(len(s)), where, closed=closed)
     tangent = unit(along(s, stations.spine, where, derivative=1, closed=closed))
     normal = spread @ stations.normal
     normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
-    return PathFrame(
+    found = PathFrame(
         at,
         even / widths[-1] * spans,
         spread @ stations.spine,
@@ -98,6 +99,39 @@ def path_frame(stations: Stations, closed: bool) -> PathFrame:
         np.maximum(spread @ stations.width, 0.3 * stations.width.min()),
         overlap,
     )
+    return found if closed else _run_on(found, length)
+
+
+def _run_on(path: PathFrame, length: float) -> PathFrame:
+    """The path with the nodes beyond both ends where its last width leads: as curved, and with no height."""
+    origin, axes = path.origin.copy(), np.stack([path.tangent, path.left, path.normal], axis=1)
+    outside = (path.at < 0) | (path.at > length)
+    inner = np.flatnonzero(~outside)
+    for last, step in ((int(inner[-1]), 1), (int(inner[0]), -1)):
+        before = int(np.clip(last - step * NODES_A_WIDTH, inner[0], inner[-1]))
+        way = float(path.at[last] - path.at[before])
+        # How the frame turns a unit of arc length, in its own axes.
+        turn = _turn(axes[before] @ axes[last].T) / way if way else np.zeros(3)
+        k = last + step
+        while 0 <= k < len(path.at):
+            s = float(path.at[k] - path.at[k - step])
+            axes[k] = _rotation(-turn * s) @ axes[k - step]
+            origin[k] = origin[k - step] + 0.5 * s * (axes[k, 0] + axes[k - step, 0])
+            k += step
+    height = np.where(outside, 0.0, path.height)
+    tangent, left, normal = (np.ascontiguousarray(axes[:, i]) for i in range(3))
+    return replace(path, origin=origin, tangent=tangent, left=left, normal=normal, height=height)
+
+
+def _turn(rotation: Array) -> Array:
+    """Rotation vector (3,) of a small rotation."""
+    return 0.5 * np.array(
+        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
+    )
+
+
+def _rotation(vector: Array) -> Array:
+    return rotation_of(vector)[0]
 
 
 def points_along(grid: Grid, path: PathFrame, reach: Array) -> Array:

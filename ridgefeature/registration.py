@@ -15,7 +15,7 @@ from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
 from ridgefeature.joint_stations import refitted
 from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
-from ridgefeature.march import Progress, Track, march, reverse
+from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.rings import ring_or_not
 from ridgefeature.scan import Scan, as_scan
@@ -76,7 +76,8 @@ def register(
     templates = _with_distances(track.templates, grid)
     stations, section = lay_out(templates, settings, track.closed), templates[0].section
     if settings.measure == "residual":
-        stations, joint = refitted(grid, stations, section, track.closed, settings)
+        ends = not track.stop[0].startswith(GOES_ON), not track.stop[1].startswith(GOES_ON)
+        stations, joint = refitted(grid, stations, section, track.closed, ends, settings)
         section = section if joint is None else joint.section
     return Ridge(
         **vars(stations),

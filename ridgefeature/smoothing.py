@@ -124,7 +124,9 @@ def smoothest(
             continue
         found = banded.solve(factored, pull).reshape(n, TERMS)
         inverse = banded.inverse_band(factored)
-        new = np.minimum(most, [_weight(lam[k], penalties[k], found[:, k], inverse, wanted[k]) for k in range(TERMS)])
+        new = np.minimum(
+            most, [_weight(lam[k], penalties[k], found[:, k], inverse, wanted[k]) for k in range(TERMS)]
+        )
         done = np.abs(np.log(new / lam)).max() < _SAME
         lam = new
         if done:
@@ -144,7 +146,9 @@ def _penalty(n: int, term: int, wanted: Floats) -> tuple[Floats, Floats, Floats]
     return band, right, d
 
 
-def _weight(lam: float, penalty: tuple[Floats, Floats, Floats], found: Floats, inverse: Floats, wanted: Floats) -> float:
+def _weight(
+    lam: float, penalty: tuple[Floats, Floats, Floats], found: Floats, inverse: Floats, wanted: Floats
+) -> float:
     """The next weight of a penalty: differences left over as large as chance makes them."""
     band, _, d = penalty
     # Off-diagonal entries count twice.

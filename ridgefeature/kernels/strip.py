@@ -58,7 +58,11 @@ def rectified(
         for j in range(n - 1):
             if not ahead[j] >= 0.0 > ahead[j + 1]:
                 continue
-            dx, dy, dz = origin[j + 1, 0] - origin[j, 0], origin[j + 1, 1] - origin[j, 1], origin[j + 1, 2] - origin[j, 2]
+            dx, dy, dz = (
+                origin[j + 1, 0] - origin[j, 0],
+                origin[j + 1, 1] - origin[j, 1],
+                origin[j + 1, 2] - origin[j, 2],
+            )
             step = math.sqrt(dx * dx + dy * dy + dz * dz)
             span = ahead[j] - ahead[j + 1]
             if span < _LEAST_STEP * step:

@@ -1,0 +1,101 @@
+"""Where a ridge ends, as all points along its path tell: further out than templates went, or earlier.
+
+A ridge that fades is followed as long as the points of one width tell it from its base; where the data end,
+or nothing but strays is left, it is cut.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.joint import Joint
+from ridgefeature.kernels.strip import A, B, C, H
+from ridgefeature.path_frame import NODES_A_WIDTH
+
+Array = NDArray[np.float64]
+
+BEYOND = 3.0
+"""How far beyond its ends a ridge is looked for, in widths."""
+VISIBLE = 25.0
+"""Evidence of a stretch of one width from which on a ridge is seen."""
+_DENSE = 0.35
+"""Points a stretch, in parts of what is usual, below which the data end."""
+_NEAR = 0.3
+"""Length in widths of the stretch whose points are counted."""
+_RISES = 1.3
+"""Height further out, in parts of that at the end, above which it is something else."""
+_SEEN = 0.6
+"""Part of the last window in which a ridge is seen that still belongs to it."""
+_BASE_AND_HEIGHT = [A, B, C, H]
+
+
+def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
+    """Twice the log likelihood ratio of ridge against none, and the height, of so many stretches in a row.
+
+    (n - stretches + 1,) each, of all such windows. Base and height are free there, the path and the width as
+    the whole ridge has them.
+    """
+    at = 0.5 * (joint.terms[1:] + joint.terms[:-1])[:, _BASE_AND_HEIGHT]
+    m = joint.matrix[:, _BASE_AND_HEIGHT][:, :, _BASE_AND_HEIGHT]
+    goal = joint.right[:, _BASE_AND_HEIGHT] + np.einsum("nij,nj->ni", m, at)
+    m, goal = _windows(m, stretches), _windows(goal, stretches)
+    sizes = np.sqrt(np.maximum(np.einsum("nii->ni", m[:, :3, :3]), 1e-300))
+    scaled = m[:, :3, :3] / (sizes[:, :, None] * sizes[:, None]) + 1e-9 * np.eye(3)
+    cross = m[:, :3, 3] / sizes
+    solved = np.linalg.solve(scaled, np.stack([cross, goal[:, :3] / sizes], axis=2))
+    left = m[:, 3, 3] - (cross * solved[:, :, 0]).sum(axis=1)
+    pull = goal[:, 3] - (cross * solved[:, :, 1]).sum(axis=1)
+    told = left > 1e-6 * m[:, 3, 3]
+    height = np.where(told, pull / np.where(told, left, 1.0), 0.0)
+    return np.where(told, height * pull, 0.0), height
+
+
+def _windows(values: Array, count: int) -> Array:
+    """Sums over all runs of `count` rows."""
+    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
+    return np.asarray(total[count:] - total[:-count])
+
+
+def ends_of(joint: Joint, start: float, end: float, open_ends: tuple[bool, bool]) -> tuple[float, float]:
+    """Arc lengths of the joint's path between which the ridge is, known so far from start to end.
+
+    The joint was fitted further out. open_ends: which of both may move.
+    """
+    path = joint.path
+    one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
+    found, height = evidence(joint, one)
+    count = _windows(joint.matrix[:, A, A], near) / _windows(path.width[1:] ** 2, near)
+    inside = (path.at >= start) & (path.at <= end)
+    dense = count > _DENSE * np.median(count[inside[:-near]])
+    low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
+    if open_ends[1]:
+        k = _end(found, height, dense, joint.terms[:, H], high, one, near)
+        end = end if k == high else float(path.at[k])
+    if open_ends[0]:
+        last = len(path.at) - 1
+        k = last - _end(found[::-1], height[::-1], dense[::-1], joint.terms[::-1, H], last - low, one, near)
+        start = start if k == low else float(path.at[k])
+    return start, end
+
+
+def _end(found: Array, height: Array, dense: Array, known: Array, i: int, one: int, near: int) -> int:
+    """The node at which a ridge ends that is known up to the i-th: further on while it is seen, or earlier.
+
+    found, height: of windows of `one` stretches from each node on; dense: whether there are data, of windows
+    of `near` stretches; known: heights at the nodes as the whole fit has them.
+    """
+    usual = float(np.median(known[max(i - one, 0) : i + 1]))
+    k = i + 1
+    while (
+        k < len(found)
+        and found[k] > VISIBLE
+        and 0.0 < height[k] / usual < _RISES
+        and dense[k : k + one].all()
+    ):
+        k += 1
+    if k > i + 1:
+        return min(k - 1 + round(_SEEN * one), len(known) - 1)
+    while i > near and not dense[i - near]:
+        i -= 1
+    return i
