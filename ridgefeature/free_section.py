@@ -25,14 +25,26 @@ _LEAST_SPANS = 20
 
 @dataclass(frozen=True, eq=False)
 class FreeSection:
-    """A section, and what it makes of a ridge's terms: they are in its own widths and apex heights."""
+    """A free section as fitted, and how much better it is than the one before."""
 
-    section: Section
-    terms: Array
+    found: Array
+    """(spans + 6,) its coefficients in apex heights of the section before, and changes of the base."""
+    wider: float
+    """What it spans, in widths."""
     gain: float
     """Twice the log likelihood ratio against the section before."""
     freedom: float
     """Effective number of coefficients."""
+
+    def applied(self, terms: Array) -> tuple[Section, Array]:
+        """The section, and a ridge's terms (n, 6) in its own widths and apex heights."""
+        raised, base = self.found[3:-6], self.found[-3:]
+        section = Section(raised, FREE)
+        new = terms.copy()
+        new[:, [A, B, C]] += base
+        new[:, W] *= self.wider
+        new[:, H] *= float(raised.max() / section.coefficients.max())
+        return section, new
 
 
 def free_section(
@@ -45,23 +57,16 @@ def free_section(
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
-    It spans `wider` widths: where its feet are `trimmed` tells once it is final.
+    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; noise: scale, strays' density and
+    evenness. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
     """
     matrix, right = section_sums(points, terms, section.table, *noise, spans, wider)
     if not (np.isfinite(matrix).all() and (np.diagonal(matrix)[-3:] > 0).all()):
         return None
     found, freedom = _smoothest(matrix, right, spans)
-    raised = found[3:spans]
-    if not raised.max() > 0:
+    if not found[3:-6].max() > 0:
         return None
-    gain = _gain(matrix, right, found, section, spans, wider)
-    shape = Section(raised, FREE)
-    new = terms.copy()
-    for k, term in enumerate((A, B, C)):
-        new[:, term] += found[spans + 3 + k]
-    new[:, W] *= wider
-    new[:, H] *= raised.max() / shape.coefficients.max()
-    return FreeSection(shape, new, gain, freedom)
+    return FreeSection(found, wider, _gain(matrix, right, found, section, spans, wider), freedom)
 
 
 def trimmed(section: Section) -> tuple[Section, float, float]:
@@ -72,7 +77,7 @@ def trimmed(section: Section) -> tuple[Section, float, float]:
     own, spans = np.linspace(-0.5, 0.5, 401), max(round(section.spans * breadth), _LEAST_SPANS)
     basis = basis_matrix(np.arange(-3.0, spans + 4.0), 3, (own + 0.5) * spans)[:, 3:-3]
     raised = np.linalg.lstsq(basis, section(middle + breadth * own), rcond=None)[0]
-    return Section(raised, "learned"), middle, breadth
+    return Section(np.asarray(raised, dtype=np.float64), "learned"), middle, breadth
 
 
 def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float]:

@@ -41,8 +41,8 @@ class Joint:
     terms: Array
     section: Section
     matrix: Array
-    right: Array
-    """(n - 1, 6, 6) and (n - 1, 6) what the points of each stretch say of a change of the terms."""
+    goal: Array
+    """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
     scale: float
     """Noise: standard deviation of the distances of points that are no strays."""
     strays: float
@@ -51,7 +51,7 @@ class Joint:
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
 
     def between_feet(self, section: Section, middle: float, breadth: float) -> Joint:
-        """The same with a section whose feet lie so far apart, about such a middle, in widths of the old one."""
+        """The same with a section whose feet lie `breadth` apart about `middle`, in widths of the old one."""
         change = np.eye(TERMS)
         change[E, W], change[W, W] = middle, breadth
         return replace(self, section=section, terms=self.terms @ change.T, smooth=self.smooth.changed(change))
@@ -63,11 +63,17 @@ class Joint:
 
 
 def fit_whole(
-    grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None = None
+    grid: Grid,
+    path: PathFrame,
+    section: Section,
+    settings: Settings,
+    weights: Array | None = None,
+    rounds: int = 3,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
-    weights (6,): of the penalties of an earlier fit, to begin with.
+    weights (6,): of the penalties of an earlier fit, to begin with. rounds: of which the last does not change
+    the section any more.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width)
     if len(points) < _FEWEST:
@@ -81,22 +87,25 @@ def fit_whole(
     middle, wanted = 0.5 * (path.knots[1:] + path.knots[:-1]), _wanted(path)
     even, inflation = _evenness(points, terms, section), 1.0
     scale, strays = _first_noise(points, terms, section, h, w)
-    for n in range(_ROUNDS):
+    shaping = settings.section in ("auto", "learned")
+    for n in range(rounds):
         distances = offsets(points, terms, section.table)
         scale, strays, density = mixture(distances, scale, strays, 4.0 * h + 0.5 * w, _NEXT_MIXTURE)
         matrix, right, sums = information(points, terms, section.table, scale, density, even)
         gain = sums[3] ** 2 / (sums[2] * sums[1])
-        if n >= _ROUNDS - 2:
+        if n > 0:
             inflation = _inflation(gain * matrix, gain * right)
         gain /= inflation
         at = 0.5 * (terms[1:] + terms[:-1])
-        smooth = smoothest(gain * matrix, gain * right, at, middle, path.coefficients, wanted, weights)
+        goal = gain * (right + np.einsum("nij,nj->ni", matrix, at))
+        smooth = smoothest(gain * matrix, goal, middle, path.coefficients, wanted, weights)
         weights = smooth.weights
         terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
         terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-        if n < _ROUNDS - 1 and settings.section in ("auto", "learned"):
-            section, terms = _shaped(points, terms, section, (scale, density, even), inflation)
-    return Joint(path, smooth, terms, section, matrix * gain, right * gain, scale, strays, inflation)
+        if shaping and n < rounds - 1:
+            new, terms = _shaped(points, terms, section, (scale, density, even), inflation)
+            shaping, section = new is not section, new
+    return Joint(path, smooth, terms, section, gain * matrix, goal, scale, strays, inflation)
 
 
 def _shaped(
@@ -109,9 +118,12 @@ def _shaped(
         found = free_section(points, terms, section, noise, spans, wider)
         if found is None:
             continue
-        net = found.gain / inflation - price * found.freedom
+        cost = price * found.freedom
+        net = found.gain / inflation - cost
         if net > best:
-            best, kept = net, (found.section, found.terms)
+            best, kept = net, found.applied(terms)
+        if net < -0.5 * cost:
+            break  # nor will a finer one do
     return kept
 
 

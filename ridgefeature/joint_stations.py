@@ -57,7 +57,7 @@ def _fit(
     grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None
 ) -> Joint | None:
     """The whole fit along a path, if it is sound, its section between its feet."""
-    joint = fit_whole(grid, path, section, settings, weights)
+    joint = fit_whole(grid, path, section, settings, weights, 3 if weights is None else 2)
     if joint is None or not _sound(joint):
         return None
     return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint
@@ -70,8 +70,8 @@ def _between_ends(
     length = float(stations.arc_length[-1])
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
-    fixed = replace(settings, section=joint.section.name)
-    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights)
+    fixed = replace(settings, section="bell")  # kept as it is
+    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations
     start, end = ends_of(wide, 0.0, length, open_ends)
@@ -138,7 +138,7 @@ def stations_of(
 
 
 def _places(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
-    """Spine (k, 3), normal (k, 3), curvature, height and width (k, 3), standard deviations (k, 2) of these two.
+    """Spine, normal (k, 3 each); curvature, height, width (k, 3); standard deviations of these two (k, 2).
 
     s (k,): arc lengths of the path that the ridge was fitted along.
     """

@@ -135,7 +135,7 @@ def _rotation(vector: Array) -> Array:
 
 
 def points_along(grid: Grid, path: PathFrame, reach: Array) -> Array:
-    """Coordinates (m, 3) of the points up to `reach` (n,) from the path: s in nodes, y and z (kernels.strip)."""
+    """Coordinates (m, 3) as in kernels.strip of the points up to `reach` (n,) from the path."""
     last = len(path.at) - 1
     parts = [_between(grid, path, reach, i, min(i + _TOGETHER, last)) for i in range(0, last, _TOGETHER)]
     return np.concatenate(parts)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import local_basis
-from ridgefeature.kernels import banded
-from ridgefeature.kernels.strip import TERMS, assembled
+from ridgefeature.kernels.penalised import assembled, most_likely
+from ridgefeature.kernels.strip import TERMS
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +21,6 @@ ORDERS = (3, 2, 1, 3, 2, 2)
 """Order of the differences that are kept small, of each term: offsets follow a smooth curvature."""
 _ROUNDS = 5
 _SAME = 0.1
-_LEAST_RIDGE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,15 +85,9 @@ def basis_at(n: int, at: Floats) -> tuple[NDArray[np.intp], Floats]:
     return local_basis(even_knots(n), 3, np.clip(at, 0.0, n - 3.0))
 
 
-def differences(n: int, order: int) -> Floats:
-    """(n - order, n) differences of coefficients."""
-    return np.asarray(np.diff(np.eye(n), order, axis=0))
-
-
 def smoothest(
     matrix: Floats,
-    right: Floats,
-    at: Floats,
+    goal: Floats,
     places: Floats,
     n: int,
     wanted: Floats,
@@ -102,57 +95,11 @@ def smoothest(
 ) -> Smooth:
     """The splines that the stretches' normal equations and the penalties ask for together.
 
-    matrix (m, 6, 6), right (m, 6): of m stretches about the terms `at` (m, 6), in units of the noise; places
-    (m,) in knots; n: coefficients a term. wanted (6, n): what the differences should be, by rows as long as
-    there are differences. weights (6,): to begin with.
+    matrix (m, 6, 6), goal (m, 6): of m stretches, in units of the noise; places (m,) in knots; n:
+    coefficients a term. wanted (6, n): what the differences should be, by rows as long as there are
+    differences. weights (6,): of the penalties, to begin with.
     """
     first, basis = basis_at(n, places)
-    band, goal = assembled(matrix, right, at, first, basis, n)
-    scale = band[:, 0].reshape(n, TERMS).mean(axis=0)
-    penalties = [_penalty(n, k, wanted[k]) for k in range(TERMS)]
-    most = 1e6 * scale / np.array([p[0][TERMS * (n // 2) + k, 0] for k, p in enumerate(penalties)])
-    lam = np.minimum(weights, most)
-    for _ in range(_ROUNDS):
-        whole, pull = band.copy(), goal.copy()
-        whole[:, 0] += np.tile(_LEAST_RIDGE * scale + 1e-300, n)
-        for k, (part, towards, _) in enumerate(penalties):
-            whole += lam[k] * part
-            pull += lam[k] * towards
-        factored, good = banded.factor(whole)
-        if not good:
-            lam *= 10.0
-            continue
-        found = banded.solve(factored, pull).reshape(n, TERMS)
-        inverse = banded.inverse_band(factored)
-        new = np.minimum(
-            most, [_weight(lam[k], penalties[k], found[:, k], inverse, wanted[k]) for k in range(TERMS)]
-        )
-        done = np.abs(np.log(new / lam)).max() < _SAME
-        lam = new
-        if done:
-            break
+    band, right = assembled(matrix, goal, first, basis, n)
+    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, _ROUNDS, _SAME)
     return Smooth(found, inverse, lam)
-
-
-def _penalty(n: int, term: int, wanted: Floats) -> tuple[Floats, Floats, Floats]:
-    """Band (6 n, 24) of the penalty's matrix, its right side (6 n,), and the differences' matrix."""
-    d = differences(n, ORDERS[term])
-    square, pull = d.T @ d, d.T @ wanted[: len(d)]
-    band, right = np.zeros((TERMS * n, 4 * TERMS)), np.zeros(TERMS * n)
-    own = np.arange(n)
-    right[TERMS * own + term] = pull
-    for k in range(min(4, n)):
-        band[TERMS * own[k:] + term, TERMS * k] = np.diagonal(square, -k)
-    return band, right, d
-
-
-def _weight(
-    lam: float, penalty: tuple[Floats, Floats, Floats], found: Floats, inverse: Floats, wanted: Floats
-) -> float:
-    """The next weight of a penalty: differences left over as large as chance makes them."""
-    band, _, d = penalty
-    # Off-diagonal entries count twice.
-    trace = float((band[:, 0] * inverse[:, 0]).sum() + 2.0 * (band[:, 1:] * inverse[:, 1:]).sum())
-    rough = float(((d @ found - wanted[: len(d)]) ** 2).sum())
-    free = max(len(d) - lam * trace, 1e-3)
-    return float(np.clip(free / max(rough, 1e-300), 1e-3 * lam, 1e3 * lam))

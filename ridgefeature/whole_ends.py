@@ -36,10 +36,8 @@ def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
     (n - stretches + 1,) each, of all such windows. Base and height are free there, the path and the width as
     the whole ridge has them.
     """
-    at = 0.5 * (joint.terms[1:] + joint.terms[:-1])[:, _BASE_AND_HEIGHT]
     m = joint.matrix[:, _BASE_AND_HEIGHT][:, :, _BASE_AND_HEIGHT]
-    goal = joint.right[:, _BASE_AND_HEIGHT] + np.einsum("nij,nj->ni", m, at)
-    m, goal = _windows(m, stretches), _windows(goal, stretches)
+    m, goal = _windows(m, stretches), _windows(joint.goal[:, _BASE_AND_HEIGHT], stretches)
     sizes = np.sqrt(np.maximum(np.einsum("nii->ni", m[:, :3, :3]), 1e-300))
     scaled = m[:, :3, :3] / (sizes[:, :, None] * sizes[:, None]) + 1e-9 * np.eye(3)
     cross = m[:, :3, 3] / sizes
@@ -79,7 +77,9 @@ def ends_of(joint: Joint, start: float, end: float, open_ends: tuple[bool, bool]
     return start, end
 
 
-def _end(found: Array, height: Array, dense: Array, known: Array, i: int, one: int, near: int) -> int:
+def _end(
+    found: Array, height: Array, dense: NDArray[np.bool_], known: Array, i: int, one: int, near: int
+) -> int:
     """The node at which a ridge ends that is known up to the i-th: further on while it is seen, or earlier.
 
     found, height: of windows of `one` stretches from each node on; dense: whether there are data, of windows

@@ -1,8 +1,8 @@
 """Symmetric positive definite systems of a small bandwidth: Cholesky's factor, solutions, variances.
 
-A matrix (n, n) whose entries vanish more than m places from the diagonal is held as its lower band (n, m + 1):
-band[i, k] is the entry at row i and column i - k. Source: Golub and Van Loan, Matrix Computations, 4.3.5; for
-the inverse within the band Erisman and Tinney 1975 (Takahashi's recursion).
+A matrix (n, n) whose entries vanish more than m places from the diagonal is held as its lower band
+(n, m + 1): band[i, k] is the entry at row i and column i - k. Source: Golub and Van Loan, Matrix
+Computations, 4.3.5; for the inverse within the band Erisman and Tinney 1975 (Takahashi's recursion).
 """
 
 from __future__ import annotations

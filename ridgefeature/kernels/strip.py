@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 TERMS = 6
 A, B, C, E, H, W = range(TERMS)
 _LEAST_STEP = 0.15
-"""Where neighbouring nodes' planes are this near to each other, in parts of their distance, they soon meet."""
+"""Distance of neighbouring nodes' planes, in parts of that of the nodes, below which they soon meet."""
 
 
 @njit(**OPTIONS)
@@ -234,32 +234,6 @@ def information(
 
 
 @njit(**OPTIONS)
-def assembled(
-    matrix: Floats, right: Floats, at: Floats, first: NDArray[np.int64], basis: Floats, n: int
-) -> tuple[Floats, Floats]:
-    """The band (6 n, 24) and right side (6 n,) of normal equations for the coefficients of six cubic splines.
-
-    matrix (m, 6, 6), right (m, 6) of m stretches whose terms are `at` (m, 6); first (m,), basis (m, 4): the
-    splines' basis functions there. Unknown 6 i + k is the i-th coefficient of the k-th term.
-    """
-    band, out = np.zeros((TERMS * n, 4 * TERMS)), np.zeros(TERMS * n)
-    for j in range(matrix.shape[0]):
-        for p in range(TERMS):
-            goal = right[j, p]
-            for q in range(TERMS):
-                goal += matrix[j, p, q] * at[j, q]
-            for k in range(4):
-                i = TERMS * (first[j] + k) + p
-                out[i] += basis[j, k] * goal
-                for l in range(4):
-                    for q in range(TERMS):
-                        other = TERMS * (first[j] + l) + q
-                        if other <= i:
-                            band[i, i - other] += basis[j, k] * basis[j, l] * matrix[j, p, q]
-    return band, out
-
-
-@njit(**OPTIONS)
 def section_sums(
     points: Floats,
     terms: Floats,
@@ -309,7 +283,7 @@ def section_sums(
         r = goal - h * f * inverse
         weight = 1.0 / (1.0 + stray / (inverse * scale) * math.exp(min(0.5 * r * r, 50.0)))
         place = (eta / wider + 0.5) * spans
-        span = min(max(np.int64(math.floor(place)), 0), spans - 1)
+        span = np.int64(min(max(place, 0.0), spans - 0.5))
         t = place - span
         inside = 1.0 if 0.0 <= t <= 1.0 else 0.0
         s = 1.0 - t

@@ -1,0 +1,137 @@
+"""Penalised splines of several terms along a path: their normal equations, and how smooth they should be.
+
+Cubic splines on even knots; a difference of a term's coefficients should be what is wanted of it (Eilers and
+Marx 1996). Unknown 6 i + k is the i-th coefficient of the k-th term.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.banded import factor, inverse_band, solve
+from ridgefeature.kernels.residual import OPTIONS
+from ridgefeature.kernels.strip import TERMS
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+_BAND = 4 * TERMS
+_HARDEST = 1e6
+"""Largest weight of a penalty, in parts of what the data say of a coefficient."""
+_LEAST_RIDGE = 1e-9
+
+
+@njit(**OPTIONS)
+def assembled(matrix: Floats, goal: Floats, first: Indices, basis: Floats, n: int) -> tuple[Floats, Floats]:
+    """The band (6 n, 24) and right side (6 n,) of normal equations for the coefficients of six cubic splines.
+
+    matrix (m, 6, 6), goal (m, 6) of m stretches; first (m,), basis (m, 4): the basis functions there.
+    """
+    band, out = np.zeros((TERMS * n, _BAND)), np.zeros(TERMS * n)
+    for j in range(matrix.shape[0]):
+        for p in range(TERMS):
+            for k in range(4):
+                i = TERMS * (first[j] + k) + p
+                out[i] += basis[j, k] * goal[j, p]
+                for m in range(4):
+                    for q in range(TERMS):
+                        other = TERMS * (first[j] + m) + q
+                        if other <= i:
+                            band[i, i - other] += basis[j, k] * basis[j, m] * matrix[j, p, q]
+    return band, out
+
+
+@njit(**OPTIONS)
+def _add_penalty(band: Floats, right: Floats, term: int, order: int, weight: float, wanted: Floats) -> None:
+    """Add to normal equations the squares of differences less what is wanted of them, times a weight."""
+    n = band.shape[0] // TERMS
+    steps = _steps(order)
+    for d in range(n - order):
+        for k in range(order + 1):
+            i = TERMS * (d + k) + term
+            right[i] += weight * steps[k] * wanted[d]
+            for m in range(k + 1):
+                band[i, TERMS * (k - m)] += weight * steps[k] * steps[m]
+
+
+@njit(**OPTIONS)
+def _steps(order: int) -> Floats:
+    """Coefficients of a difference: binomial, of alternating sign."""
+    out = np.zeros(order + 1)
+    out[0] = 1.0
+    for _ in range(order):
+        for k in range(order, 0, -1):
+            out[k] = out[k - 1] - out[k]
+        out[0] = -out[0]
+    return out
+
+
+@njit(**OPTIONS)
+def _next_weight(
+    found: Floats, inverse: Floats, term: int, order: int, weight: float, wanted: Floats
+) -> float:
+    """The weight that makes differences left over as large as chance does (Wood and Fasiolo 2017)."""
+    n = found.size // TERMS
+    steps = _steps(order)
+    trace = rough = 0.0
+    for d in range(n - order):
+        left = -wanted[d]
+        for k in range(order + 1):
+            left += steps[k] * found[TERMS * (d + k) + term]
+            i = TERMS * (d + k) + term
+            for m in range(k + 1):
+                twice = 1.0 if m == k else 2.0
+                trace += twice * steps[k] * steps[m] * inverse[i, TERMS * (k - m)]
+        rough += left * left
+    free = max(n - order - weight * trace, 1e-3)
+    return min(max(free / max(rough, 1e-300), 1e-3 * weight), 1e3 * weight)
+
+
+@njit(**OPTIONS)
+def most_likely(
+    band: Floats,
+    right: Floats,
+    orders: Indices,
+    wanted: Floats,
+    weights: Floats,
+    rounds: int,
+    same: float,
+) -> tuple[Floats, Floats, Floats]:
+    """Coefficients (n, 6), band of their covariance (6 n, 24), weights (6,), of largest restricted likelihood.
+
+    wanted (6, n): of the differences of each term; weights: to begin with; same: relative change of the
+    weights at which they stay.
+    """
+    n = band.shape[0] // TERMS
+    most, least = np.zeros(TERMS), np.zeros(TERMS)
+    for k in range(TERMS):
+        size = 0.0
+        for i in range(n):
+            size += band[TERMS * i + k, 0] / n
+        least[k] = _LEAST_RIDGE * size + 1e-300
+        most[k] = _HARDEST * size + 1e-290
+    lam = np.minimum(weights, most)
+    found, inverse = np.zeros(TERMS * n), np.zeros_like(band)
+    for _ in range(rounds):
+        whole, pull = band.copy(), right.copy()
+        for k in range(TERMS):
+            for i in range(n):
+                whole[TERMS * i + k, 0] += least[k]
+            _add_penalty(whole, pull, k, orders[k], lam[k], wanted[k])
+        factored, good = factor(whole)
+        if not good:
+            least *= 1e3
+            continue
+        found = solve(factored, pull)
+        inverse = inverse_band(factored)
+        change = 0.0
+        for k in range(TERMS):
+            new = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k]), most[k])
+            change = max(change, abs(math.log(new / lam[k])))
+            lam[k] = new
+        if change < same:
+            break
+    return found.reshape(n, TERMS), inverse, lam
