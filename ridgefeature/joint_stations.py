@@ -57,7 +57,7 @@ def _fit(
     grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None
 ) -> Joint | None:
     """The whole fit along a path, if it is sound, its section between its feet."""
-    joint = fit_whole(grid, path, section, settings, weights, 3 if weights is None else 2)
+    joint = fit_whole(grid, path, section, settings, weights, 4 if weights is None else 3)
     if joint is None or not _sound(joint):
         return None
     return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint

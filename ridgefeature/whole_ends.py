@@ -14,11 +14,14 @@ from ridgefeature.kernels.strip import A, B, C, H
 from ridgefeature.path_frame import NODES_A_WIDTH
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 BEYOND = 3.0
 """How far beyond its ends a ridge is looked for, in widths."""
 VISIBLE = 25.0
 """Evidence of a stretch of one width from which on a ridge is seen."""
+_OUTER = 3.0
+"""Evidence of its outer half: the inner one may lie on an end that is known a little too early."""
 _DENSE = 0.35
 """Points a stretch, in parts of what is usual, below which the data end."""
 _NEAR = 0.3
@@ -63,36 +66,34 @@ def ends_of(joint: Joint, start: float, end: float, open_ends: tuple[bool, bool]
     path = joint.path
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
     found, height = evidence(joint, one)
+    half, above = evidence(joint, one // 2)
+    half = np.where(above * np.median(path.height[path.at > 0]) > 0, half, 0.0)
     count = _windows(joint.matrix[:, A, A], near) / _windows(path.width[1:] ** 2, near)
     inside = (path.at >= start) & (path.at <= end)
     dense = count > _DENSE * np.median(count[inside[:-near]])
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
     if open_ends[1]:
-        k = _end(found, height, dense, joint.terms[:, H], high, one, near)
+        seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
+        k = _end(seen, height, dense, joint.terms[:, H], high, one, near)
         end = end if k == high else float(path.at[k])
     if open_ends[0]:
         last = len(path.at) - 1
-        k = last - _end(found[::-1], height[::-1], dense[::-1], joint.terms[::-1, H], last - low, one, near)
+        seen = (found > VISIBLE) & (half[: len(found)] > _OUTER)
+        k = last - _end(seen[::-1], height[::-1], dense[::-1], joint.terms[::-1, H], last - low, one, near)
         start = start if k == low else float(path.at[k])
     return start, end
 
 
-def _end(
-    found: Array, height: Array, dense: NDArray[np.bool_], known: Array, i: int, one: int, near: int
-) -> int:
+def _end(seen: Flags, height: Array, dense: Flags, known: Array, i: int, one: int, near: int) -> int:
     """The node at which a ridge ends that is known up to the i-th: further on while it is seen, or earlier.
 
-    found, height: of windows of `one` stretches from each node on; dense: whether there are data, of windows
+    seen, height: of windows of `one` stretches from each node on; dense: whether there are data, of windows
     of `near` stretches; known: heights at the nodes as the whole fit has them.
     """
     usual = float(np.median(known[max(i - one, 0) : i + 1]))
     k = i + 1
-    while (
-        k < len(found)
-        and found[k] > VISIBLE
-        and 0.0 < height[k] / usual < _RISES
-        and dense[k : k + one].all()
-    ):
+    seen = seen & (height * usual > 0) & (np.abs(height) < _RISES * abs(usual))
+    while k < len(seen) and seen[k] and dense[k : k + one].all():
         k += 1
     if k > i + 1:
         return min(k - 1 + round(_SEEN * one), len(known) - 1)
