@@ -56,6 +56,18 @@ class Joint:
         change[E, W], change[W, W] = middle, breadth
         return replace(self, section=section, terms=self.terms @ change.T, smooth=self.smooth.changed(change))
 
+    def without(self, term: int) -> Joint:
+        """The same where one term is 0."""
+        keep = np.eye(TERMS)
+        keep[term, term] = 0.0
+        return replace(self, terms=self.terms @ keep, smooth=self.smooth.changed(keep))
+
+    @property
+    def bent(self) -> float:
+        """The largest change of the base's curvature, in its standard deviations."""
+        std = self.deviations(C)
+        return float((np.abs(self.terms[:, C]) / np.where(std > 0, std, np.inf)).max())
+
     def deviations(self, term: int) -> Array:
         """(n,) standard deviations of a term at the nodes."""
         first, basis = basis_at(self.path.coefficients, self.path.knots)
@@ -69,11 +81,12 @@ def fit_whole(
     settings: Settings,
     weights: Array | None = None,
     rounds: int = 3,
+    flat: bool = False,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     weights (6,): of the penalties of an earlier fit, to begin with. rounds: of which the last does not change
-    the section any more.
+    the section any more. flat: the base stays as curved across as the path has it.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width)
     if len(points) < _FEWEST:
@@ -93,19 +106,29 @@ def fit_whole(
         scale, strays, density = mixture(distances, scale, strays, 4.0 * h + 0.5 * w, _NEXT_MIXTURE)
         matrix, right, sums = information(points, terms, section.table, scale, density, even)
         gain = sums[3] ** 2 / (sums[2] * sums[1])
+        if not np.isfinite(matrix).all() or not np.isfinite(gain):
+            return None
         if n > 0:
             inflation = _inflation(gain * matrix, gain * right)
         gain /= inflation
         at = 0.5 * (terms[1:] + terms[:-1])
-        goal = gain * (right + np.einsum("nij,nj->ni", matrix, at))
-        smooth = smoothest(gain * matrix, goal, middle, path.coefficients, wanted, weights)
+        matrix, goal = gain * matrix, gain * (right + np.einsum("nij,nj->ni", matrix, at))
+        if flat:
+            _fix(matrix, goal, C)
+        smooth = smoothest(matrix, goal, middle, path.coefficients, wanted, weights)
         weights = smooth.weights
         terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
         terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
         if shaping and n < rounds - 1:
             new, terms = _shaped(points, terms, section, (scale, density, even), inflation)
             shaping, section = new is not section, new
-    return Joint(path, smooth, terms, section, gain * matrix, goal, scale, strays, inflation)
+    return Joint(path, smooth, terms, section, matrix, goal, scale, strays, inflation)
+
+
+def _fix(matrix: Array, goal: Array, term: int) -> None:
+    """Let normal equations ask for 0 of one term, whatever the others are."""
+    goal[:, term] = matrix[:, term] = matrix[:, :, term] = 0.0
+    matrix[:, term, term] = 1.0
 
 
 def _shaped(

@@ -12,7 +12,7 @@ from ridgefeature.bspline import Curve
 from ridgefeature.free_section import FREE, trimmed
 from ridgefeature.grid import Grid
 from ridgefeature.joint import Joint, fit_whole
-from ridgefeature.kernels.strip import A, E, H, W
+from ridgefeature.kernels.strip import A, C, E, H, W
 from ridgefeature.path_frame import PathFrame, path_frame, unit
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -22,6 +22,8 @@ from ridgefeature.whole_ends import BEYOND, ends_of
 
 Array = NDArray[np.float64]
 
+_BENT = 4.5
+"""Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
 _NARROWEST = 0.2
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _SHORTEST = 1.5
@@ -40,38 +42,46 @@ def refitted(
 
     open_ends: which ends may move, further out or back.
     """
-    first = _fit(grid, path_frame(stations, closed), section, settings, None)
+    flat = settings.flat
+    first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:
         return stations, None
-    count = len(stations.arc_length)
-    stations = stations_of(first, count, settings)
+    if not stations.curvature.any() and first.bent < _BENT:
+        flat = True
+        first = first.without(C)
+    laid = stations_of(first, len(stations.arc_length), settings)
     if not closed and any(open_ends):
-        stations = _between_ends(grid, stations, first, open_ends, settings)
-    joint = _fit(grid, path_frame(stations, closed), first.section, settings, first.smooth.weights)
+        laid = _between_ends(grid, laid, first, open_ends, settings, flat)
+    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first.smooth.weights, flat)
     if joint is None:
-        return stations, first
-    return stations_of(joint, len(stations.arc_length), settings), joint
+        return laid, first
+    return stations_of(joint, len(laid.arc_length), settings), joint
 
 
 def _fit(
-    grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None
+    grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None, flat: bool
 ) -> Joint | None:
     """The whole fit along a path, if it is sound, its section between its feet."""
-    joint = fit_whole(grid, path, section, settings, weights, 4 if weights is None else 3)
+    joint = fit_whole(grid, path, section, settings, weights, 4 if weights is None else 3, flat)
     if joint is None or not _sound(joint):
         return None
     return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint
 
 
 def _between_ends(
-    grid: Grid, stations: Stations, joint: Joint, open_ends: tuple[bool, bool], settings: Settings
+    grid: Grid,
+    stations: Stations,
+    joint: Joint,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+    flat: bool,
 ) -> Stations:
     """The stations between the ends that all points along the path tell."""
     length = float(stations.arc_length[-1])
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
     fixed = replace(settings, section="bell")  # kept as it is
-    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2)
+    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2, flat)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations
     start, end = ends_of(wide, 0.0, length, open_ends)

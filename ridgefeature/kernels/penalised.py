@@ -100,7 +100,7 @@ def most_likely(
     rounds: int,
     same: float,
 ) -> tuple[Floats, Floats, Floats]:
-    """Coefficients (n, 6), band of their covariance (6 n, 24), weights (6,), of largest restricted likelihood.
+    """Coefficients (n, 6), band of their covariance (6 n, 24) and weights (6,), most likely together.
 
     wanted (6, n): of the differences of each term; weights: to begin with; same: relative change of the
     weights at which they stay.

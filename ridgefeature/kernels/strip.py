@@ -106,46 +106,71 @@ def rectified(
     return out[:m]
 
 
+Terms = tuple[float, float, float, float, float, float]
+Columns = tuple[Floats, Floats, Floats, Floats]
+
+
 @njit(**INNER)
-def _section(
-    eta: float, constant: Floats, linear: Floats, quadratic: Floats, cubic: Floats
-) -> tuple[float, float, float]:
-    """Height, slope and second derivative of the section at eta."""
+def terms_at(terms: Floats, s: float) -> tuple[int, Terms]:
+    """The stretch that a place between nodes is in, and the six terms there."""
+    j = min(np.int64(s), terms.shape[0] - 2)
+    u = s - j
+    v = 1.0 - u
+    return j, (
+        v * terms[j, A] + u * terms[j + 1, A],
+        v * terms[j, B] + u * terms[j + 1, B],
+        v * terms[j, C] + u * terms[j + 1, C],
+        v * terms[j, E] + u * terms[j + 1, E],
+        v * terms[j, H] + u * terms[j + 1, H],
+        v * terms[j, W] + u * terms[j + 1, W],
+    )
+
+
+@njit(**INNER)
+def surface_at(y: float, terms: Terms, table: Columns) -> tuple[float, float, float, float, float, float]:
+    """Height of the base and of the section (part of the apex height), how the latter changes with y for an
+    apex height of 1, place in widths, slope and second derivative of the surface."""
+    a, b, c, e, h, w = terms
+    constant, linear, quadratic, cubic = table
     spans = constant.size - 2.0
+    eta = (y - e) / w
     position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
     span = np.int64(position)
     t = position - span
-    b, c, d = linear[span], quadratic[span], cubic[span]
-    return (
-        constant[span] + t * (b + t * (c + t * d)),
-        spans * (b + t * (2.0 * c + 3.0 * t * d)),
-        spans * spans * (2.0 * c + 6.0 * t * d),
-    )
+    per_y = spans / w
+    p, q, r = linear[span], quadratic[span], cubic[span]
+    f = constant[span] + t * (p + t * (q + t * r))
+    rate = per_y * (p + t * (2.0 * q + 3.0 * t * r))
+    bow = h * per_y * per_y * (2.0 * q + 6.0 * t * r)
+    return a + y * (b + c * y), f, rate, eta, b + 2.0 * c * y + h * rate, 2.0 * c + bow
+
+
+@njit(**INNER)
+def noise_bias(scale: float, bow: float, inverse: float, even: float) -> float:
+    """Mean distance, in noise scales, of points measured about a bent surface, seen at their own y.
+
+    The mean height at a measured y is that of the surface smeared over the noise. even: 0 for points that lie
+    evenly over the base, 1 evenly over the surface. inverse: 1 over the length of the surface's gradient.
+    """
+    bias = 0.5 * scale * bow * inverse * (1.0 + 2.0 * even * (1.0 - inverse * inverse))
+    return min(max(bias, -0.5), 0.5)
+
+
+@njit(**INNER)
+def share_of_surface(r: float, inverse: float, stray: float) -> float:
+    """Chance that a point is of the surface, no stray, by its distance in noise scales."""
+    return 1.0 / (1.0 + stray / inverse * math.exp(min(0.5 * r * r, 50.0)))
 
 
 @njit(**OPTIONS)
 def offsets(points: Floats, terms: Floats, table: Floats) -> Floats:
     """Distances (m,) of points (m, 3) in path coordinates from the surface; terms (nodes, 6)."""
-    constant, linear, quadratic, cubic = split(table)
+    own = split(table)
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        j = min(np.int64(points[i, 0]), terms.shape[0] - 2)
-        u = points[i, 0] - j
-        v = 1.0 - u
-        y = points[i, 1]
-        a, b, c = (
-            v * terms[j, A] + u * terms[j + 1, A],
-            v * terms[j, B] + u * terms[j + 1, B],
-            v * terms[j, C] + u * terms[j + 1, C],
-        )
-        e, h, w = (
-            v * terms[j, E] + u * terms[j + 1, E],
-            v * terms[j, H] + u * terms[j + 1, H],
-            v * terms[j, W] + u * terms[j + 1, W],
-        )
-        f, slope, _ = _section((y - e) / w, constant, linear, quadratic, cubic)
-        tilt = b + 2.0 * c * y + h * slope / w
-        out[i] = (points[i, 2] - a - y * (b + c * y) - h * f) / math.sqrt(1.0 + tilt * tilt)
+        _, there = terms_at(terms, points[i, 0])
+        base, f, _, _, slope, _ = surface_at(points[i, 1], there, own)
+        out[i] = (points[i, 2] - base - there[4] * f) / math.sqrt(1.0 + slope * slope)
     return out
 
 
@@ -159,12 +184,11 @@ def mixture(r: Floats, scale: float, share: float, span: float, rounds: int) -> 
     least = 1e-3 * scale
     stray = 0.0
     for _ in range(rounds):
-        stray = share / (1.0 - share) * 2.5066282746310002 * scale / span
+        stray = share / (1.0 - share) * math.sqrt(2.0 * math.pi) * scale / span
         total = square = 0.0
         inverse = 1.0 / scale
         for i in range(r.size):
-            x = r[i] * inverse
-            weight = 1.0 / (1.0 + stray * math.exp(min(0.5 * x * x, 50.0)))
+            weight = share_of_surface(r[i] * inverse, 1.0, stray)
             total += weight
             square += weight * r[i] * r[i]
         scale = max(math.sqrt(square / max(total, 1.0)), least)
@@ -179,124 +203,40 @@ def information(
     """What the points of each stretch between two nodes say of the terms there.
 
     Weighted normal equations in units of the noise scale: matrices (nodes - 1, 6, 6), right sides
-    (nodes - 1, 6), and the sums (4,) over all points of 1, weight, psi^2 and psi'. Derivatives are taken at
-    the point's own y and the stretch's middle.
+    (nodes - 1, 6), and the sums (4,) over all points of 1, weight, psi^2 and psi'. stray: as `mixture` has
+    it; even: as in `noise_bias`. Derivatives are taken at the point's own y and the stretch's middle.
     """
-    constant, linear, quadratic, cubic = split(table)
+    own = split(table)
     stretches = terms.shape[0] - 1
     matrix, right = np.zeros((stretches, TERMS, TERMS)), np.zeros((stretches, TERMS))
     sums = np.zeros(4)
     row, turn = np.empty(TERMS), np.empty(TERMS)
     for i in range(points.shape[0]):
-        j = min(np.int64(points[i, 0]), stretches - 1)
-        u = points[i, 0] - j
-        v = 1.0 - u
         y = points[i, 1]
-        a, b, c = (
-            v * terms[j, A] + u * terms[j + 1, A],
-            v * terms[j, B] + u * terms[j + 1, B],
-            v * terms[j, C] + u * terms[j + 1, C],
-        )
-        e, h, w = (
-            v * terms[j, E] + u * terms[j + 1, E],
-            v * terms[j, H] + u * terms[j + 1, H],
-            v * terms[j, W] + u * terms[j + 1, W],
-        )
-        eta = (y - e) / w
-        f, rate, bow = _section(eta, constant, linear, quadratic, cubic)
-        rate /= w
-        slope, bow = h * rate, bow * h / (w * w)
-        tilt = b + 2.0 * c * y + slope
-        inverse = 1.0 / math.sqrt(1.0 + tilt * tilt)
-        # Noise along a bent surface leads off it, to the outside.
-        bias = 0.5 * scale * (2.0 * c + bow) * inverse * (1.0 + 2.0 * even * (1.0 - inverse * inverse))
-        r = (points[i, 2] - a - y * (b + c * y) - h * f) * inverse / scale - min(max(bias, -0.5), 0.5)
-        weight = 1.0 / (1.0 + stray / inverse * math.exp(min(0.5 * r * r, 50.0)))
+        j, there = terms_at(terms, points[i, 0])
+        h, w = there[4], there[5]
+        base, f, rate, eta, slope, bow = surface_at(y, there, own)
+        inverse = 1.0 / math.sqrt(1.0 + slope * slope)
+        r = (points[i, 2] - base - h * f) * inverse / scale - noise_bias(scale, bow, inverse, even)
+        weight = share_of_surface(r, inverse, stray)
         sums[0] += 1.0
         sums[1] += weight
         sums[2] += weight * weight * r * r
         sums[3] += weight - weight * (1.0 - weight) * r * r
-        # The distance also changes with the slope, by which heights are divided.
-        curl = (r * r - 1.0) * tilt * inverse * inverse
+        # The likelihood of a height at its y also changes with the slope, by which distances are shortened.
+        curl = (r * r - 1.0) * slope * inverse * inverse
+        bow -= 2.0 * there[2]
         turn[A], turn[B], turn[C] = 0.0, curl, 2.0 * y * curl
-        turn[E], turn[H], turn[W] = -bow * curl, rate * curl, -(slope / w + bow * eta) * curl
+        turn[E], turn[H], turn[W] = -bow * curl, rate * curl, -(h * rate / w + bow * eta) * curl
         inverse /= scale
         row[A], row[B], row[C] = inverse, y * inverse, y * y * inverse
-        row[E], row[H], row[W] = -slope * inverse, f * inverse, -slope * eta * inverse
+        row[E], row[H], row[W] = -h * rate * inverse, f * inverse, -h * rate * eta * inverse
         for p in range(TERMS):
             right[j, p] += weight * (r * row[p] + turn[p])
             for q in range(p + 1):
                 matrix[j, p, q] += weight * row[p] * row[q]
-    for p in range(TERMS):
-        for q in range(p):
-            matrix[:, q, p] = matrix[:, p, q]
+    for j in range(stretches):
+        for p in range(TERMS):
+            for q in range(p):
+                matrix[j, q, p] = matrix[j, p, q]
     return matrix, right, sums
-
-
-@njit(**OPTIONS)
-def section_sums(
-    points: Floats,
-    terms: Floats,
-    table: Floats,
-    scale: float,
-    stray: float,
-    even: float,
-    spans: int,
-    wider: float,
-) -> tuple[Floats, Floats]:
-    """Normal equations, in units of the noise, of a section and of the base's offset, tilt and curvature.
-
-    The section is a cubic spline on so many equal spans over `wider` widths: its coefficients (spans + 3,),
-    heights in apex heights; the last three unknowns change the base everywhere, in powers of y. The matrix is
-    (spans + 6, spans + 6).
-    """
-    constant, linear, quadratic, cubic = split(table)
-    n = spans + 6
-    matrix, right = np.zeros((n, n)), np.zeros(n)
-    index, row = np.empty(7, np.int64), np.empty(7)
-    for k in range(3):
-        index[4 + k] = spans + 3 + k
-    for i in range(points.shape[0]):
-        j = min(np.int64(points[i, 0]), terms.shape[0] - 2)
-        u = points[i, 0] - j
-        v = 1.0 - u
-        y = points[i, 1]
-        a, b, c = (
-            v * terms[j, A] + u * terms[j + 1, A],
-            v * terms[j, B] + u * terms[j + 1, B],
-            v * terms[j, C] + u * terms[j + 1, C],
-        )
-        e, h, w = (
-            v * terms[j, E] + u * terms[j + 1, E],
-            v * terms[j, H] + u * terms[j + 1, H],
-            v * terms[j, W] + u * terms[j + 1, W],
-        )
-        eta = (y - e) / w
-        f, slope, bow = _section(eta, constant, linear, quadratic, cubic)
-        slope, bow = slope * h / w, bow * h / (w * w)
-        tilt = b + 2.0 * c * y + slope
-        inverse = 1.0 / math.sqrt(1.0 + tilt * tilt)
-        bias = 0.5 * scale * (2.0 * c + bow) * inverse * (1.0 + 2.0 * even * (1.0 - inverse * inverse))
-        bias = min(max(bias, -0.5), 0.5)
-        inverse /= scale
-        goal = (points[i, 2] - a - y * (b + c * y)) * inverse - bias
-        r = goal - h * f * inverse
-        weight = 1.0 / (1.0 + stray / (inverse * scale) * math.exp(min(0.5 * r * r, 50.0)))
-        place = (eta / wider + 0.5) * spans
-        span = np.int64(min(max(place, 0.0), spans - 0.5))
-        t = place - span
-        inside = 1.0 if 0.0 <= t <= 1.0 else 0.0
-        s = 1.0 - t
-        row[0] = s * s * s / 6.0
-        row[1] = (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0
-        row[2] = (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0
-        row[3] = t * t * t / 6.0
-        for k in range(4):
-            index[k] = span + k
-            row[k] *= inside * h * inverse
-        row[4], row[5], row[6] = inverse, y * inverse, y * y * inverse
-        for k in range(7):
-            right[index[k]] += weight * goal * row[k]
-            for m in range(7):
-                matrix[index[k], index[m]] += weight * row[k] * row[m]
-    return matrix, right
