@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix
-from ridgefeature.kernels.strip import A, B, C, H, W, section_sums
+from ridgefeature.kernels.section_sums import section_sums
+from ridgefeature.kernels.strip import A, B, C, H, W
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
