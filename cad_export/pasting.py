@@ -103,8 +103,8 @@ class _Stand:
         if w not in self.sites:
             surface, base = (self.ridge.resized(h=h, w=w).surface(self.base) for h in (1, 0))
             # The border of the flanks stays at all widths, and with it what is left of the face.
-            like = next((site.ground for site in self.sites.values()), None)
-            self.sites[w] = Site(self.face, surface, base, shared=like)
+            like = next((site.like or site for site in self.sites.values()), None)
+            self.sites[w] = Site(self.face, surface, base, like=like)
             while len(self.sites) > _KEPT_WIDTHS:
                 self.sites.pop(next(iter(self.sites)))
         return self.sites[w]
