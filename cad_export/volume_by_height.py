@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ class VolumeByHeight:
     @cached_property
     def _worked_out(self) -> tuple[tuple[float, ...], tuple[float, float]]:
         base, centre = self.base, self.base.poles.mean(axis=(0, 1))  # near by, so that no digits are lost
-        u, v = _Nodes.of(base.knots_u, base.degree_u), _Nodes.of(base.knots_v, base.degree_v)
+        u, v = _nodes(base.knots_u.tobytes(), base.degree_u), _nodes(base.knots_v.tobytes(), base.degree_v)
         poles = np.stack([base.poles - centre, self.surface.poles - base.poles])
         volumes = np.zeros(3) if base.closed[0] else _caps(poles, v)
         limits = [(-np.inf, np.inf)]
@@ -125,21 +125,24 @@ class _Nodes:
     basis: tuple[Floats, Floats]
     weights: Floats
 
-    @staticmethod
-    def of(knots: Floats, degree: int) -> _Nodes:
-        x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
-        breaks = np.unique(knots)
-        half = 0.5 * np.diff(breaks)[:, None]
-        nodes = (breaks[:-1, None] + half * (1.0 + x)).ravel()
-        found = [local_basis(knots, degree, nodes, k) for k in (0, 1)]
-        value, rate = (basis.reshape(len(half), len(x), degree + 1) for _, basis in found)
-        return _Nodes(found[0][0][:: len(x), None] + np.arange(degree + 1), (value, rate), half * w)
-
     def values(self, poles: Floats, derivative: int = 0) -> Floats:
         """Values (..., all nodes) of splines with the poles (..., n)."""
         near = np.moveaxis(poles, -1, 0).reshape(poles.shape[-1], -1)[self.near]
         values = np.matmul(self.basis[derivative], near).reshape(self.weights.size, -1)
         return np.ascontiguousarray(values.T).reshape(*poles.shape[:-1], -1)
+
+
+@lru_cache(16)
+def _nodes(knots: bytes, degree: int) -> _Nodes:
+    """The nodes for these knots; other widths and heights have the same."""
+    x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
+    t = np.frombuffer(knots)
+    breaks = np.unique(t)
+    half = 0.5 * np.diff(breaks)[:, None]
+    nodes = (breaks[:-1, None] + half * (1.0 + x)).ravel()
+    found = [local_basis(t, degree, nodes, k) for k in (0, 1)]
+    value, rate = (basis.reshape(len(half), len(x), degree + 1) for _, basis in found)
+    return _Nodes(found[0][0][:: len(x), None] + np.arange(degree + 1), (value, rate), half * w)
 
 
 def _cross(a: Sequence[Floats] | Floats, b: Sequence[Floats] | Floats) -> list[Floats]:
