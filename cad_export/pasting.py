@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import cadquery as cq
@@ -109,7 +110,7 @@ class _Stand:
                 self.sites.pop(next(iter(self.sites)))
         return self.sites[w]
 
-    @property
+    @cached_property
     def middle(self) -> tuple[float, float, float]:
         """The point of the face under the middle of the ridge."""
         x, y, z = self.base(np.array([0.5 * self.base.length]), np.zeros((1, 1)))[0][0, 0].tolist()

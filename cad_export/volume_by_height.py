@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 class VolumeByHeight:
     """A base and a surface over it of the same knots, and all heights h: base + h (surface - base).
 
-    Exact by Gauss-Legendre, as a surface's flux (divergence theorem) is a cubic in h.
+    What the surface sweeps as h grows: its rise times its normal, a square in h. Exact by Gauss-Legendre.
     """
 
     surface: Surface
@@ -50,28 +50,27 @@ class VolumeByHeight:
 
     @cached_property
     def _worked_out(self) -> tuple[tuple[float, ...], tuple[float, float]]:
-        base, centre = self.base, self.base.poles.mean(axis=(0, 1))  # near by, so that no digits are lost
+        base, rise = self.base, self.surface.poles - self.base.poles
         u, v = _nodes(base.knots_u.tobytes(), base.degree_u), _nodes(base.knots_v.tobytes(), base.degree_v)
-        poles = np.stack([base.poles - centre, self.surface.poles - base.poles])
-        volumes = np.zeros(3) if base.closed[0] else _caps(poles, v)
-        limits = [(-np.inf, np.inf)]
+        swept, limits = np.zeros(3), [(-np.inf, np.inf)]
         # span by span across, where the rise is not 0: else it adds nothing, and arrays fit the cache
-        spans = np.flatnonzero(poles[1].any(axis=(0, 2))[v.near].any(axis=1))
+        spans = np.flatnonzero(rise.any(axis=(0, 2))[v.near].any(axis=1))
         first, last = (v.near[spans[0], 0], v.near[spans[-1], -1]) if spans.size else (0, 0)
-        rows = poles[:, :, first : last + 1].transpose(0, 3, 2, 1)  # (base or rise, 3, v's poles, u's)
-        along = [u.values(rows, k) for k in (0, 1)]
+        poles = np.stack([base.poles, rise])[:, :, first : last + 1]
+        along = [
+            u.values(poles.transpose(0, 3, 2, 1), k) for k in (0, 1)
+        ]  # (base or rise, 3, v's poles, u's)
         for k in spans:
             near = slice(v.near[k, 0] - first, v.near[k, -1] + 1 - first)
-            grids = (v.basis[i][k] @ along[j][:, :, near] for i, j in ((0, 0), (0, 1), (1, 0)))
-            (f, d), (fu, du), (fv, dv) = grids  # (3, v's nodes, u's nodes) each
-            one, other = _cross(fu, dv), _cross(du, fv)
-            normals = _cross(fu, fv), [a + b for a, b in zip(one, other, strict=True)], _cross(du, dv)
-            parts = _dot(f, normals[1]) + _dot(d, normals[0]), _dot(f, normals[2]) + _dot(d, normals[1])
-            weights = v.weights[k]
-            volumes += [weights @ part @ u.weights.ravel() / 3 for part in (*parts, _dot(d, normals[2]))]
+            value, rate = v.basis[0][k], v.basis[1][k]
+            d = value @ along[0][1, :, near]  # (3, v's nodes, u's nodes), as all that follow
+            (fu, du), (fv, dv) = value @ along[1][:, :, near], rate @ along[0][:, :, near]
+            mixed = zip(_cross(fu, dv), _cross(du, fv), strict=True)
+            normals = _cross(fu, fv), [a + b for a, b in mixed], _cross(du, dv)
+            swept += [v.weights[k] @ _dot(d, n) @ u.weights.ravel() for n in normals]
             limits.append(_limits(*(_dot(n, normals[0]) for n in normals)))
         lows, highs = zip(*limits, strict=True)
-        return tuple(volumes.tolist()), (float(max(lows)), float(min(highs)))
+        return tuple((swept / (1, 2, 3)).tolist()), (float(max(lows)), float(min(highs)))
 
 
 def volume_between(surface: Surface, base: Surface) -> float:
@@ -86,10 +85,11 @@ def _limits(a: Floats, b: Floats, c: Floats) -> tuple[float, float]:
     if not (a > 0).all():
         return 0.0, 0.0
     # The roots as 1 / h, so that none is lost where c is nearly 0: a x^2 + b x + c = 0.
-    square = b * b - 4 * a * c
+    half = 0.5 * b
+    square = half * half - a * c
     root = np.full_like(square, -np.inf)  # none: neither highest nor lowest
     np.sqrt(square, out=root, where=square >= 0)
-    highest, lowest = ((root - b) / (2 * a)).max(), ((-b - root) / (2 * a)).min()
+    highest, lowest = ((root - half) / a).max(), -((root + half) / a).max()
     return (1 / lowest if lowest < 0 else -np.inf), (1 / highest if highest > 0 else np.inf)
 
 
@@ -99,18 +99,6 @@ def _advice(low: float, high: float) -> str:
     bounds = [f"{word} {h:.3g}" for word, h in (("above", low), ("below", high)) if abs(h) < 100]
     stay = f"stay {' and '.join(bounds)}, or " if bounds else ""
     return f"{stay}use a path with wider bends"
-
-
-def _caps(poles: Floats, v: _Nodes) -> Floats:
-    """The caps' part in the volume, of h, h^2, h^3: ruled faces from the base's end rows to the ridge's."""
-    rows = poles[:, [0, -1]].transpose(1, 0, 3, 2)  # (end, base or rise, 3, v's poles)
-    values, rates = (v.values(rows, k) for k in (0, 1))
-    parts, weights = np.zeros(3), v.weights.ravel()
-    for end, sign in enumerate((-1, 1)):
-        (f, d), (df, dd) = values[end], rates[end]
-        parts[0] += sign * float(_dot(f, _cross(df, d)) @ weights) / 3
-        parts[1] += sign * float(_dot(f, _cross(dd, d)) @ weights) / 6
-    return parts
 
 
 @dataclass(frozen=True, eq=False)
