@@ -54,12 +54,11 @@ class VolumeByHeight:
         u, v = _nodes(base.knots_u.tobytes(), base.degree_u), _nodes(base.knots_v.tobytes(), base.degree_v)
         swept, limits = np.zeros(3), [(-np.inf, np.inf)]
         # span by span across, where the rise is not 0: else it adds nothing, and arrays fit the cache
-        spans = np.flatnonzero(rise.any(axis=(0, 2))[v.near].any(axis=1))
+        raised = np.abs(rise).max(axis=(0, 2)) > 0
+        spans = np.flatnonzero(raised[v.near].any(axis=1))
         first, last = (v.near[spans[0], 0], v.near[spans[-1], -1]) if spans.size else (0, 0)
-        poles = np.stack([base.poles, rise])[:, :, first : last + 1]
-        along = [
-            u.values(poles.transpose(0, 3, 2, 1), k) for k in (0, 1)
-        ]  # (base or rise, 3, v's poles, u's)
+        poles = np.stack([base.poles, rise])[:, :, first : last + 1].transpose(0, 3, 2, 1)
+        along = [u.values(poles, k) for k in (0, 1)]  # (base or rise, 3, v's poles, u's nodes)
         for k in spans:
             near = slice(v.near[k, 0] - first, v.near[k, -1] + 1 - first)
             value, rate = v.basis[0][k], v.basis[1][k]
