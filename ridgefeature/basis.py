@@ -123,8 +123,10 @@ def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> 
 def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Parameters clipped to the domain by no more than rounding, and which of them were NaN."""
     low, high = knots[degree], knots[knots.size - degree - 1]
-    nan = np.isnan(at)
     slack = 1e-12 * max(high - low, abs(low), abs(high))
+    if at.size and at.min() >= low - slack and at.max() <= high + slack:  # not for NaN
+        return np.clip(at, low, high), np.zeros(at.shape, dtype=np.bool_)
+    nan = np.isnan(at)
     outside = (at < low - slack) | (at > high + slack)
     if outside.any():
         raise ValueError(
