@@ -86,8 +86,7 @@ def _limits(a: Floats, b: Floats, c: Floats) -> tuple[float, float]:
     # The roots as 1 / h, so that none is lost where c is nearly 0: a x^2 + b x + c = 0.
     half = 0.5 * b
     square = half * half - a * c
-    root = np.full_like(square, -np.inf)  # none: neither highest nor lowest
-    np.sqrt(square, out=root, where=square >= 0)
+    root = np.where(square >= 0, np.sqrt(np.abs(square)), -np.inf)  # none: neither highest nor lowest
     highest, lowest = ((root - half) / a).max(), -((root + half) / a).max()
     return (1 / lowest if lowest < 0 else -np.inf), (1 / highest if highest > 0 else np.inf)
 
