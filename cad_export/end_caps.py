@@ -49,62 +49,62 @@ def lifts(row: Curve, base: Curve, least: float) -> list[Lift]:
     Both rows have the same knots. A row is off the base where their distance is `least` or more. Where their
     distance changes its sign a stretch ends and the next begins.
     """
-    return [_lift(row, base, a, b) for a, b in _stretches(row, base, least)]
-
-
-def _stretches(row: Curve, base: Curve, least: float) -> list[tuple[float, float]]:
     gap = Curve(row.poles - base.poles, row.knots, row.degree)
-    if np.abs(gap.poles).max() <= least:
+    return [_lift(gap, base, a, b) for a, b in _stretches(gap, least)]
+
+
+def _stretches(gap: Curve, least: float) -> list[tuple[float, float]]:
+    apart = np.abs(gap.poles).max(axis=1)
+    if apart.max() <= least:
         return []
-    breaks = np.unique(row.knots)
-    v = np.interp(np.arange(32 * (len(breaks) - 1) + 1) / 32, np.arange(len(breaks)), breaks)
+    some = np.flatnonzero(apart)  # beyond what these poles bear on there is no gap
+    breaks = np.unique(gap.knots[some[0] : some[-1] + gap.degree + 2])
+    v = _halved(breaks, 32)
     g = gap(v)
-    side = g @ g[np.argmax((g**2).sum(axis=1))]
-    sign = np.where((g**2).sum(axis=1) > least**2, np.sign(side), 0.0)
-    changes = np.flatnonzero(np.diff(sign) != 0)
-    ends = [(int(i), float(sign[i]), float(sign[i + 1])) for i in changes]
-    found, start = [], None
-    for i, before, after in ends:
-        if before != 0 and start is not None:
-            found.append((start, _edge(gap, least, v[i + 1], v[i])))
-        if after != 0:
-            start = _edge(gap, least, v[i], v[i + 1])
-    return found
+    square = (g**2).sum(axis=1)
+    sign = np.where(square > least**2, np.sign(g @ g[np.argmax(square)]), 0.0)
+    changes = np.flatnonzero(np.diff(sign))
+    starts, ends = (changes[sign[changes + k] != 0] for k in (1, 0))
+    ends = ends[ends > starts[0]] if starts.size else starts
+    starts = starts[: len(ends)]
+    off, on = v[np.concatenate([starts, ends + 1])], v[np.concatenate([starts + 1, ends])]
+    return [(a, b) for a, b in _edges(gap, least, off, on).reshape(2, -1).T.tolist()]
 
 
-def _edge(gap: Curve, least: float, off: float, on: float) -> float:
-    """Where the gap reaches `least` between a parameter where it is smaller and one where it is larger."""
-    for _ in range(2):
-        t = np.linspace(off, on, 1025)
-        first = int(np.argmax(np.linalg.norm(gap(t), axis=1) >= least))
-        off, on = float(t[max(first - 1, 0)]), float(t[first])
+def _edges(gap: Curve, least: float, off: Floats, on: Floats) -> Floats:
+    """Where the gap reaches `least`: between parameters (m,) where it is smaller and where it is larger."""
+    for _ in range(4):
+        t = np.linspace(off, on, 33)
+        first = np.argmax((gap(t) ** 2).sum(axis=-1) >= least**2, axis=0)
+        row = np.arange(len(off))
+        off, on = t[np.maximum(first - 1, 0), row], t[first, row]
     return on
 
 
-def _lift(row: Curve, base: Curve, a: float, b: float) -> Lift:
+def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:
     """The ruled surface from the base's row in the direction of the ridge's.
 
     The direction is a smooth curve of unit vectors: the row itself is no border of the surface, which would
     shrink to points at both feet, but a curve on it.
     """
-    inner = np.unique(row.knots)
+    inner = np.unique(gap.knots)
     inner = inner[(inner > a) & (inner < b)]
     knots = clamped_knots(np.concatenate([[a], inner, [b]]), 3)
     fine = clamped_knots(_halved(np.concatenate([[a], inner, [b]]), 4), 3)
     t = _halved(fine[3:-3], 3)
-    gap = row(t) - base(t)
-    mean = gap[np.argmax((gap**2).sum(axis=1))]
-    size = np.linalg.norm(gap, axis=1, keepdims=True) * np.sign(gap @ mean)[:, None]
+    both = Curve(np.hstack([base.poles, gap.poles]), base.knots, base.degree)
+    low, apart = np.split(both(t), 2, axis=1)
+    mean = apart[np.argmax((apart**2).sum(axis=1))]
+    size = np.linalg.norm(apart, axis=1, keepdims=True) * np.sign(apart @ mean)[:, None]
     basis = basis_matrix(knots, 3, t)
-    up = np.linalg.lstsq(basis * size, gap, rcond=1e-9)[0]
+    up = np.linalg.lstsq(basis * size, apart, rcond=1e-9)[0]
     foot = interpolate(knots, 3, base(greville(knots, 3)))
     reach = np.array([min(0.0, 1.25 * size.min()), max(0.0, 1.25 * size.max())])
     sites = greville(fine, 3)
-    at = row(sites) - base(sites)
     along = basis_matrix(knots, 3, sites) @ up
-    rise = Curve(interpolate(fine, 3, (at * along).sum(1) / (along**2).sum(1))[:, None], fine, 3)
-    off = np.linalg.norm((basis @ up) * rise(t) - gap, axis=1).max()
-    off = max(float(off), float(np.linalg.norm(base(t) - basis @ foot, axis=1).max()))
+    rise = Curve(interpolate(fine, 3, (gap(sites) * along).sum(1) / (along**2).sum(1))[:, None], fine, 3)
+    off = np.linalg.norm((basis @ up) * rise(t) - apart, axis=1).max()
+    off = max(float(off), float(np.linalg.norm(low - basis @ foot, axis=1).max()))
     return Lift((a, b), knots, foot, up, reach, rise, off)
 
 

@@ -13,8 +13,11 @@ from ridgefeature.ridge import Ridge
 
 Floats = NDArray[np.float64]
 
-UNFOLDED = 0.15
-"""What one goes along a flank's border for a step along the path must be this part of that, at least."""
+UNFOLDED = 0.3
+"""What one goes along a flank's border for a step along the path must be this part of that, at least.
+
+At 0.15 the surface of a real ridge that hooks at its start crossed itself between two stations.
+"""
 _AROUND = 3  # stations to either side that are narrowed alike
 _SPARE = 1.05
 

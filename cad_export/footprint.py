@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,8 +85,7 @@ class HostSurface:
 
     def points(self, uv: Floats) -> Floats:
         """(n, 3) points of the surface at parameters (n, 2)."""
-        found = [self._adaptor.Value(u, v) for u, v in uv.tolist()]
-        return np.array([(p.X(), p.Y(), p.Z()) for p in found])
+        return np.array([self._adaptor.Value(u, v).Coord() for u, v in uv.tolist()])
 
     def _on_plane(self, points: Floats) -> Floats:
         return _local(self._adaptor.Plane().Position(), points)[:, :2]
@@ -186,11 +185,17 @@ def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) 
 
 
 def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
-    """A plane curve, poles (n, 2), with the same poles and knots in OCCT."""
-    flat = np.zeros((len(curve.poles), 2, 3))
-    flat[:, :, :2] = curve.poles[:, None]
+    """A plane curve, poles (n, 2), with the same poles and knots in OCCT; kept, as sliders ask again."""
+    return _curve2d(curve.poles.tobytes(), curve.knots.tobytes(), curve.degree)
+
+
+@lru_cache(_KEPT_CURVES)
+def _curve2d(poles: bytes, knots: bytes, degree: int) -> Geom2d_BSplineCurve:
+    points = np.frombuffer(poles).reshape(-1, 1, 2)
+    flat = np.zeros((len(points), 2, 3))
+    flat[:, :, :2] = points
     flat[:, 1, 2] = 1.0  # an iso-curve of a strip: curves need no array containers of their own
-    strip = to_occt(Surface(flat, curve.knots, _ACROSS, curve.degree, 1))
+    strip = to_occt(Surface(flat, np.frombuffer(knots), _ACROSS, degree, 1))
     return GeomAPI.To2d_s(strip.VIso(0.0), gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)))
 
 

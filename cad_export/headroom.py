@@ -153,7 +153,7 @@ def _gaps(solid: TopoDS_Shape, base: FaceBase, x: Floats) -> tuple[Floats, Float
     for i, (p, d) in enumerate(np.stack([points, normals], axis=-2).reshape(-1, 2, 3).tolist()):
         line = gp_Lin(gp_Pnt(*p), gp_Dir(*d))
         meeting.Perform(line, -far, far)
-        hits = np.array([meeting.WParameter(k) for k in range(1, meeting.NbPnt() + 1)])
-        for side, at in enumerate((-hits, hits)):
-            gaps[side, i] = at[at > near].min(initial=np.inf)
+        hits = [meeting.WParameter(k) for k in range(1, meeting.NbPnt() + 1)]
+        gaps[0, i] = min((-at for at in hits if -at > near), default=np.inf)
+        gaps[1, i] = min((at for at in hits if at > near), default=np.inf)
     return gaps[0].reshape(x.shape[:-1]), gaps[1].reshape(x.shape[:-1])

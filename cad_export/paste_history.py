@@ -6,6 +6,7 @@ import zlib
 from base64 import b64decode, b64encode
 from collections import OrderedDict
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from io import BytesIO
 from typing import Any
 
@@ -19,7 +20,8 @@ from cad_export.geometry import topods
 from cad_export.record import Carried
 
 _KEPT = 32
-"""Parts whose making is remembered."""
+"""Parts whose making is remembered, and hosts."""
+_KEPT_TEXTS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +70,9 @@ def to_text(shape: TopoDS_Shape) -> str:
     return b64encode(zlib.compress(stream.getvalue())).decode("ascii")
 
 
+@lru_cache(_KEPT_TEXTS)
 def from_text(text: str) -> cq.Shape:
-    """The shape that `to_text` wrote."""
+    """The shape that `to_text` wrote; the same one for the same text, so that what is known of it serves."""
     return cq.Shape.importBin(BytesIO(zlib.decompress(b64decode(text))))
 
 
@@ -79,7 +82,7 @@ def remember(
     """Let the ridge's face carry its feature and how the part was made."""
     if record is None:
         return
-    before = _PARTS.get(id(host.TShape()))
+    before = _known(host)
     if before is None or not host.IsEqual(before.shape):
         before = _Part(host, volume(host, 1e-6), {"brep": to_text(host)}, 0)
         _keep(before)
@@ -87,6 +90,19 @@ def remember(
     _keep(after)
     document = place.document(before.pastes, after)
     attach(face, replace(record, placement=document, host=before.host))
+
+
+def known_volume(shape: TopoDS_Shape) -> float | None:
+    """The volume of a part that `paste` made or was given, wherever it was moved; None for any other."""
+    found = _known(shape)
+    return found.volume if found and found.shape.Orientation() == shape.Orientation() else None
+
+
+def _known(shape: TopoDS_Shape) -> _Part | None:
+    key = id(shape.TShape())
+    if key in _PARTS:
+        _PARTS.move_to_end(key)  # a slider asks for its host again and again
+    return _PARTS.get(key)
 
 
 def _keep(part: _Part) -> None:

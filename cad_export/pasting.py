@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import cadquery as cq
@@ -103,13 +104,13 @@ class _Stand:
         if w not in self.sites:
             surface, base = (self.ridge.resized(h=h, w=w).surface(self.base) for h in (1, 0))
             # The border of the flanks stays at all widths, and with it what is left of the face.
-            like = next((site.ground for site in self.sites.values()), None)
-            self.sites[w] = Site(self.face, surface, base, shared=like)
+            like = next((site.like or site for site in self.sites.values()), None)
+            self.sites[w] = Site(self.face, surface, base, like=like)
             while len(self.sites) > _KEPT_WIDTHS:
                 self.sites.pop(next(iter(self.sites)))
         return self.sites[w]
 
-    @property
+    @cached_property
     def middle(self) -> tuple[float, float, float]:
         """The point of the face under the middle of the ridge."""
         x, y, z = self.base(np.array([0.5 * self.base.length]), np.zeros((1, 1)))[0][0, 0].tolist()

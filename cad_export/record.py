@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from ridgefeature.io.feature import to_document
+from ridgefeature.io.feature import from_document, to_document
 from ridgefeature.ridge import Ridge
 
 Matrix = tuple[tuple[float, ...], ...]
@@ -33,6 +34,10 @@ class Carried:
     motion: Matrix = UNMOVED
 
 
+_KEPT = 8
+
+_RIDGES: deque[tuple[dict[str, Any], Ridge]] = deque(maxlen=_KEPT)
+"""The ridges of documents that were asked for lately."""
 _DOCUMENTS: WeakKeyDictionary[Ridge, dict[str, Any]] = WeakKeyDictionary()
 
 
@@ -46,3 +51,14 @@ def record_of(ridge: Any, h: float = 1, w: float = 1, name: str = "ridge") -> Ca
     if ridge not in _DOCUMENTS:  # a Ridge does not change
         _DOCUMENTS[ridge] = to_document(ridge)
     return Carried(name, _DOCUMENTS[ridge], float(h), float(w))
+
+
+def ridge_in(record: Carried) -> Ridge:
+    """The ridge of a record, as registered; the same one for equal documents, so that sliders are warm."""
+    document = record.feature
+    for known, ridge in _RIDGES:
+        if known == document:
+            return ridge
+    ridge = from_document(document)
+    _RIDGES.append((document, ridge))
+    return ridge

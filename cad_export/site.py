@@ -88,8 +88,8 @@ class Site:
     surface: Surface
     base: Surface
     _lifts: dict[tuple[int, float], list[Lift]] = field(default_factory=dict, repr=False)
-    shared: Ground | None = None
-    """That of a site with the same border, another width of a ridge."""
+    like: Site | None = None
+    """A site with the same border on the same face, for another width: it is asked for what they share."""
 
     def __post_init__(self) -> None:
         for a in (self.surface, self.base):
@@ -147,7 +147,7 @@ class Site:
     @cached_property
     def ground(self) -> Ground:
         """What is left of the face beside the footprint."""
-        return self.shared or ground_under(self.base)
+        return self.like.ground if self.like else ground_under(self.base)
 
     @cached_property
     def volume(self) -> VolumeByHeight:
@@ -199,12 +199,15 @@ class Site:
                 for (curve, space, _, forward), flat, f in zip(parts, flats, found, strict=True)
             )
             made.append(Loop(tuple(lines), line + shift))
-        _check_crossings([loop.polyline for loop in made])
+        if self.like is None:
+            _check_crossings([loop.polyline for loop in made])
         return tuple(made)
 
     @cached_property
     def division(self) -> Division:
         """How the loops divide the face; ValueError where they leave it or meet holes and earlier ridges."""
+        if self.like is not None:
+            return self.like.division
         loops = [self._as_hole(loop.polyline) for loop in self.loops]
         areas = [signed_area(loop) for loop in loops]
         outer = int(np.argmax(np.abs(areas)))
@@ -244,6 +247,8 @@ class Site:
     @cached_property
     def own(self) -> list[tuple[TopoDS_Wire, Floats]]:
         """The face's own wires, the outer one first, and straight pieces along them."""
+        if self.like is not None:
+            return self.like.own
         return [(wire, segments_of(wire, self.face)) for wire in wires_of(self.face)]
 
     @property

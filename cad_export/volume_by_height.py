@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ Floats = NDArray[np.float64]
 class VolumeByHeight:
     """A base and a surface over it of the same knots, and all heights h: base + h (surface - base).
 
-    Exact by Gauss-Legendre, as a surface's flux (divergence theorem) is a cubic in h.
+    What the surface sweeps as h grows: its rise times its normal, a square in h. Exact by Gauss-Legendre.
     """
 
     surface: Surface
@@ -44,29 +45,31 @@ class VolumeByHeight:
         return self._worked_out[1]
 
     @property
-    def _coefficients(self) -> tuple[float, float, float]:
+    def _coefficients(self) -> tuple[float, ...]:
         return self._worked_out[0]
 
     @cached_property
-    def _worked_out(self) -> tuple[tuple[float, float, float], tuple[float, float]]:
-        base, centre = self.base, self.base.poles.mean(axis=(0, 1))  # near by, so that no digits are lost
-        u, v = _Nodes.of(base.knots_u, base.degree_u), _Nodes.of(base.knots_v, base.degree_v)
-        poles = np.stack([base.poles - centre, self.surface.poles - base.poles])
-        rows = np.moveaxis(poles, 1, 0).reshape(poles.shape[1], -1)
-        # (v's poles, 2, 3, u's nodes): each coordinate is a whole array in the products below
-        along = [u.values(rows, k).reshape(-1, 2, poles.shape[2], 3).transpose(2, 1, 3, 0) for k in (0, 1)]
-        columns = [np.ascontiguousarray(a).reshape(len(a), -1) for a in along]
-        grids = (v.values(columns[i], k) for i, k in ((0, 0), (1, 0), (0, 1)))
-        (f, d), (fu, du), (fv, dv) = (np.moveaxis(g.reshape(len(g), 2, 3, -1), 0, 2) for g in grids)
-        normals = _cross(fu, fv), _cross(fu, dv) + _cross(du, fv), _cross(du, dv)
-        flux = [[float(v.weights @ _dot(p, n) @ u.weights) / 3 for n in normals] for p in (f, d)]
-        caps = [0.0, 0.0] if base.closed[0] else _caps(poles, v)
-        volumes = (
-            flux[0][1] + flux[1][0] + caps[0],
-            flux[0][2] + flux[1][1] + caps[1],
-            flux[1][2],
-        )
-        return volumes, _limits(*(_dot(n, normals[0]) for n in normals))
+    def _worked_out(self) -> tuple[tuple[float, ...], tuple[float, float]]:
+        base, rise = self.base, self.surface.poles - self.base.poles
+        u, v = _nodes(base.knots_u.tobytes(), base.degree_u), _nodes(base.knots_v.tobytes(), base.degree_v)
+        swept, limits = np.zeros(3), [(-np.inf, np.inf)]
+        # span by span across, where the rise is not 0: else it adds nothing, and arrays fit the cache
+        raised = np.abs(rise).max(axis=(0, 2)) > 0
+        spans = np.flatnonzero(raised[v.near].any(axis=1))
+        first, last = (v.near[spans[0], 0], v.near[spans[-1], -1]) if spans.size else (0, 0)
+        poles = np.stack([base.poles, rise])[:, :, first : last + 1].transpose(0, 3, 2, 1)
+        along = [u.values(poles, k) for k in (0, 1)]  # (base or rise, 3, v's poles, u's nodes)
+        for k in spans:
+            near = slice(v.near[k, 0] - first, v.near[k, -1] + 1 - first)
+            value, rate = v.basis[0][k], v.basis[1][k]
+            d = value @ along[0][1, :, near]  # (3, v's nodes, u's nodes), as all that follow
+            (fu, du), (fv, dv) = value @ along[1][:, :, near], rate @ along[0][:, :, near]
+            mixed = zip(_cross(fu, dv), _cross(du, fv), strict=True)
+            normals = _cross(fu, fv), [a + b for a, b in mixed], _cross(du, dv)
+            swept += [v.weights[k] @ _dot(d, n) @ u.weights.ravel() for n in normals]
+            limits.append(_limits(*(_dot(n, normals[0]) for n in normals)))
+        lows, highs = zip(*limits, strict=True)
+        return tuple((swept / (1, 2, 3)).tolist()), (float(max(lows)), float(min(highs)))
 
 
 def volume_between(surface: Surface, base: Surface) -> float:
@@ -81,12 +84,10 @@ def _limits(a: Floats, b: Floats, c: Floats) -> tuple[float, float]:
     if not (a > 0).all():
         return 0.0, 0.0
     # The roots as 1 / h, so that none is lost where c is nearly 0: a x^2 + b x + c = 0.
-    square = b * b - 4 * a * c
-    some = square >= 0
-    if not some.any():
-        return -np.inf, np.inf
-    root, half = np.sqrt(square[some]), -b[some]
-    highest, lowest = ((half + root) / (2 * a[some])).max(), ((half - root) / (2 * a[some])).min()
+    half = 0.5 * b
+    square = half * half - a * c
+    root = np.where(square >= 0, np.sqrt(np.abs(square)), -np.inf)  # none: neither highest nor lowest
+    highest, lowest = ((root - half) / a).max(), -((root + half) / a).max()
     return (1 / lowest if lowest < 0 else -np.inf), (1 / highest if highest > 0 else np.inf)
 
 
@@ -98,53 +99,43 @@ def _advice(low: float, high: float) -> str:
     return f"{stay}use a path with wider bends"
 
 
-def _caps(poles: Floats, v: _Nodes) -> list[float]:
-    """The caps' part in the volume, of h and of h^2: ruled faces from the base's end rows to the ridge's."""
-    rows = poles[:, [0, -1]].transpose(2, 1, 0, 3)  # (v's poles, end, base or rise, 3)
-    flat = rows.reshape(len(rows), -1)
-    values, rates = (np.moveaxis(v.values(flat, k).reshape(-1, 2, 2, 3), 0, 3) for k in (0, 1))
-    parts = [0.0, 0.0]
-    for end, sign in enumerate((-1, 1)):
-        (f, d), (df, dd) = (x[end] for x in (values, rates))
-        parts[0] += sign * float(v.weights @ _dot(f, _cross(df, d))) / 3
-        parts[1] += sign * float(v.weights @ _dot(f, _cross(dd, d))) / 6
-    return parts
-
-
 @dataclass(frozen=True, eq=False)
 class _Nodes:
     """Gauss-Legendre nodes in every span of a clamped spline, exact for products of three such splines.
 
-    first: the first pole that bears on a span (k,); basis: of values and derivatives, (k, n, degree + 1).
+    near: the poles that bear on a span (k, degree + 1); basis: of values and derivatives, (k, n, degree + 1);
+    weights (k, n).
     """
 
-    first: NDArray[np.intp]
+    near: NDArray[np.intp]
     basis: tuple[Floats, Floats]
     weights: Floats
 
-    @staticmethod
-    def of(knots: Floats, degree: int) -> _Nodes:
-        x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
-        breaks = np.unique(knots)
-        half = 0.5 * np.diff(breaks)[:, None]
-        nodes = (breaks[:-1, None] + half * (1.0 + x)).ravel()
-        found = [local_basis(knots, degree, nodes, k) for k in (0, 1)]
-        shape = len(half), len(x), degree + 1
-        value, rate = (basis.reshape(shape) for _, basis in found)
-        return _Nodes(found[0][0][:: len(x)], (value, rate), (half * w).ravel())
-
     def values(self, poles: Floats, derivative: int = 0) -> Floats:
-        """Values (all nodes, m) of splines with the poles (n, m)."""
-        basis = self.basis[derivative]
-        near = poles[self.first[:, None] + np.arange(basis.shape[2])]
-        return np.matmul(basis, near).reshape(-1, poles.shape[1])
+        """Values (..., all nodes) of splines with the poles (..., n)."""
+        near = np.moveaxis(poles, -1, 0).reshape(poles.shape[-1], -1)[self.near]
+        values = np.matmul(self.basis[derivative], near).reshape(self.weights.size, -1)
+        return np.ascontiguousarray(values.T).reshape(*poles.shape[:-1], -1)
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+@lru_cache(16)
+def _nodes(knots: bytes, degree: int) -> _Nodes:
+    """The nodes for these knots; other widths and heights have the same."""
+    x, w = np.polynomial.legendre.leggauss((3 * degree + 1) // 2)
+    t = np.frombuffer(knots)
+    breaks = np.unique(t)
+    half = 0.5 * np.diff(breaks)[:, None]
+    nodes = (breaks[:-1, None] + half * (1.0 + x)).ravel()
+    found = [local_basis(t, degree, nodes, k) for k in (0, 1)]
+    value, rate = (basis.reshape(len(half), len(x), degree + 1) for _, basis in found)
+    return _Nodes(found[0][0][:: len(x), None] + np.arange(degree + 1), (value, rate), half * w)
+
+
+def _cross(a: Sequence[Floats] | Floats, b: Sequence[Floats] | Floats) -> list[Floats]:
     """Cross product of coordinates (3, ...)."""
     (ax, ay, az), (bx, by, bz) = a, b
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
 
 
-def _dot(a: Floats, b: Floats) -> Floats:
+def _dot(a: Sequence[Floats] | Floats, b: Sequence[Floats] | Floats) -> Floats:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

@@ -16,6 +16,7 @@ from cad_export.certificate import Change, certify, check_shape, free_mesh_edges
 from cad_export.check import subshapes
 from cad_export.inset import inset
 from cad_export.volume_by_height import volume_between
+from ridgefeature.bspline import Surface
 
 SURFACE, BASE = flat_ridge(1.0, z=5.0), flat_ridge(0.0, z=5.0)
 
@@ -77,6 +78,11 @@ def test_solids_that_run_through_themselves_fail_the_thorough_check() -> None:
 @pytest.mark.parametrize("h", [2.0, -1.0])
 def test_the_volume_between_is_the_flux_with_its_caps_and_does_not_hang_on_the_place(h: float) -> None:
     bent = [on_map(flat_ridge(k), cylinder_map(20.0)) for k in (h, 0.0)]
+    high, low = bent
+    rows = [np.stack([low.poles[end], high.poles[end]]) for end in (0, -1)]
+    start, end = (Surface(p, np.array([0.0, 0.0, 1.0, 1.0]), low.knots_v, 1, low.degree_v) for p in rows)
+    enclosed = high.flux() - low.flux() + start.flux() - end.flux()
+    assert volume_between(high, low) == pytest.approx(enclosed, rel=1e-12)
     far = [dataclasses.replace(s, poles=s.poles + 1000.0) for s in bent]
     assert volume_between(*far) == pytest.approx(volume_between(*bent), rel=1e-9)
     straight = [flat_ridge(k, bend=0.0) for k in (h, 0.0)]

@@ -17,7 +17,7 @@ import ridgefeature as rf
 
 @pytest.fixture(scope="module")
 def ridge() -> rf.Ridge:
-    return spiral_ridge().stretched(40.0, "trim")
+    return spiral_ridge().stretched(20.0, "trim")
 
 
 @pytest.fixture(scope="module")
@@ -169,5 +169,5 @@ def test_paths_that_hold_no_file(tmp_path: Path) -> None:
 
 def test_info_tells_pasted_ridges(file: Path) -> None:
     said = run("info", file).stdout
-    assert re.search(r"carries bead +40 mm long, .* h 1\.2, w 1, pasted\n", said)
-    assert re.search(r"carries Größe +40 mm long, .* h 1, w 1, pasted\n", said)
+    assert re.search(r"carries bead +20 mm long, .* h 1\.2, w 1, pasted\n", said)
+    assert re.search(r"carries Größe +20 mm long, .* h 1, w 1, pasted\n", said)

@@ -11,11 +11,14 @@ from dataclasses import dataclass
 import cadquery as cq
 import numpy as np
 import pytest
+from OCP.BRep import BRep_Tool
 from oracles import spiral_ridge
 
 import cad_export as cx
 import ridgefeature as rf
+from cad_export import pasting
 from cad_export.check import volume
+from cad_export.occt_arrays import pole_array
 
 HEIGHTS = np.linspace(-2.0, 3.0, 50)
 MEASURED = slice(0, 50, 7)
@@ -103,3 +106,20 @@ def test_on_a_plane_the_volume_is_affine_in_the_height_elsewhere_cubic(heights: 
 def test_what_was_measured_is_what_was_expected(heights: Heights) -> None:
     np.testing.assert_allclose(heights.added, heights.expected, rtol=1e-3, atol=1e-3)
     np.testing.assert_allclose(heights.whole, heights.expected[MEASURED], rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", HOSTS)
+def test_another_width_is_the_same_on_a_warm_place_and_a_cold_one(name: str, ridge: rf.Ridge) -> None:
+    host = HOSTS[name]()
+    place = {"face": host.face, "at": host.at, "direction": host.direction, "scale": 0.5, "check": False}
+    widths = (1.0, 0.8, 0.97, 1.1, 1.2, 0.6)
+    warm = [cx.paste(ridge, host.solid, w=w, **place) for w in widths]
+    stand = next(reversed(pasting._STANDS.values()))
+    assert len(stand.sites) == pasting._KEPT_WIDTHS < len(widths)
+    for w, part in zip(widths, warm, strict=True):
+        pasting._STANDS.clear()
+        cold = cx.paste(ridge, host.solid, w=w, **place)
+        one, other = (pole_array(BRep_Tool.Surface_s(cx.carried_by(p)[0][0])) for p in (part, cold))
+        assert np.array_equal(one, other)
+        # the rest of the face is measured once, at the first width
+        assert volume(part.wrapped, 1e-6) == pytest.approx(volume(cold.wrapped, 1e-6), rel=1e-9)

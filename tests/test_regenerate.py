@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import cadquery as cq
+import numpy as np
 import pytest
+from OCP.BRep import BRep_Tool
 from oracles import spiral_ridge
 
 import cad_export as cx
 import ridgefeature as rf
+from cad_export import paste_history, record, regeneration
+from cad_export.occt_arrays import pole_array
 
 
 @pytest.fixture(scope="module")
@@ -120,3 +124,77 @@ def test_what_cannot_be_regenerated_says_why(part, host, ridge, tmp_path):
         cx.regenerate(part, h=2, name="bead")
     with pytest.raises(OSError):
         cx.regenerate(tmp_path / "none.step")
+
+
+def poles_of(part: cq.Solid) -> list[np.ndarray]:
+    return [pole_array(BRep_Tool.Surface_s(face)) for face, _ in cx.carried_by(part)]
+
+
+def test_it_is_the_paste_at_those_rates_bit_for_bit_warm_or_cold(part, host, ridge, tmp_path):
+    place = {"at": (-20, 0, 5), "direction": (0, 1, 0), "check": False}
+    one = cx.paste(ridge, host, h=1.2, **place)
+    file = cx.step(one, tmp_path / "one.step")
+    for rates in ({"h": 0.7}, {"h": 1.3}, {"h": -0.5}, {"h": 1.2, "w": 0.8}, {"h": 1.3, "w": 1.1}):
+        expected = cx.paste(ridge, host, **rates, **place)
+        for source in (one, one, file):
+            again = cx.regenerate(source, **rates, check=False)
+            assert all(np.array_equal(*pair) for pair in zip(*map(poles_of, (again, expected)), strict=True))
+            assert again.Volume(1e-6) == expected.Volume(1e-6)
+
+
+def faces_in_both(a: cq.Solid, b: cq.Solid) -> int:
+    return sum(any(f.isSame(g) for g in b.Faces()) for f in a.Faces())
+
+
+def test_what_does_not_change_is_made_once(part):
+    """A slider pastes on the very same host, and the very same ridges before the one that it moves."""
+    slid = [cx.regenerate(part, h=h, name="ridge 2", check=False) for h in (1.1, 1.2)]
+    slid.append(cx.regenerate(slid[0], h=1.3, name="ridge 2", check=False))
+    for other in slid[1:]:
+        # all but the face that the ridge stands on, the ridge and its two caps
+        assert faces_in_both(slid[0], other) >= len(other.Faces()) - 4
+        assert len(other.Faces()) > 12
+
+
+def test_a_slider_measures_no_whole_part(part, monkeypatch):
+    last = cx.regenerate(part, h=1.5, check=False)
+    for module in (paste_history, regeneration):
+        monkeypatch.setattr(module, "volume", lambda *_: pytest.fail("a volume was measured"))
+    for h in (1.6, 1.7):
+        last = cx.regenerate(last, h=h, check=False)
+    moved = last.moved(cq.Location((1, 2, 3)))
+    assert [r.h for _, r in cx.carried_by(cx.regenerate(moved, h=2, check=False))] == [2, 2]
+
+
+def test_a_part_changed_since_is_refused_however_warm_it_is(part, tmp_path):
+    last = cx.regenerate(cx.regenerate(part, h=1.5, check=False), h=1.4, check=False)
+    drilled = last.cut(cq.Solid.makeCylinder(1, 40, cq.Vector(52, -30, -20)))
+    shallow = last.cut(cq.Solid.makeCylinder(30, 0.01, cq.Vector(0, 0, -5)))
+    assert abs(shallow.Volume(1e-6) / last.Volume(1e-6) - 1) < 1e-3
+    inside_out = cq.Solid(last.wrapped.Reversed())
+    for changed in (drilled, shallow, inside_out, cx.step(drilled, tmp_path / "drilled.step")):
+        with pytest.raises(ValueError, match="it was changed since"):
+            cx.regenerate(changed, h=1.3, check=False)
+    assert cx.regenerate(last, h=1.3, check=False).isValid()
+
+
+def test_a_part_of_the_same_faces_and_another_volume_is_refused(ridge):
+    made = cx.paste(ridge, cq.Workplane().box(120, 80, 10).val(), at=(0, 0, 5), check=False)
+    thinner = made.cut(cq.Solid.makeBox(120, 80, 0.01, cq.Vector(-60, -40, -5)))
+    assert len(thinner.Faces()) == len(made.Faces())
+    with pytest.raises(ValueError, match="it was changed since"):
+        cx.regenerate(thinner, h=1.3, check=False)
+
+
+def test_what_is_remembered_is_bounded(part, ridge, monkeypatch):
+    monkeypatch.setattr(paste_history, "_KEPT", 3)
+    for h in (1.0, 1.1, 1.2):
+        cx.regenerate(part, h=h, check=False)
+    assert len(paste_history._PARTS) == 3
+    for size in range(paste_history._KEPT_TEXTS + 2):
+        paste_history.from_text(paste_history.to_text(cq.Solid.makeBox(1, 1, 1 + size).wrapped))
+    assert paste_history.from_text.cache_info().currsize == paste_history._KEPT_TEXTS
+    for scale in range(1, record._KEPT + 3):
+        record.ridge_in(record.record_of(ridge.resized(h=scale)))
+    assert len(record._RIDGES) == record._KEPT
+    assert len(regeneration._INNER) <= 8

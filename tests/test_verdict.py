@@ -114,7 +114,7 @@ def test_there_is_no_ridge_on_surfaces_without_one(kind: str) -> None:
 def test_a_corner_is_no_ridge_on_a_curved_base(seed: int) -> None:
     """Its two planes no longer look like planes where its base is taken for curved."""
     points, click = ridge_free("corner", seed)
-    with pytest.raises(rf.NoRidgeError, match="an edge explains it|wide, on"):
+    with pytest.raises(rf.NoRidgeError, match=r"an edge explains it|wide, on"):
         rf.register(points, at=click, kind="auto")
 
 

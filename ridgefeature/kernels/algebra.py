@@ -12,6 +12,13 @@ Floats = NDArray[np.float64]
 
 
 @njit(cache=True)
+def copy_into(target: Floats, values: Floats) -> None:
+    """Write values (n,) over target (n,): numba takes seconds to compile the assignment of a slice."""
+    for i in range(target.shape[0]):
+        target[i] = values[i]
+
+
+@njit(cache=True)
 def cholesky_in_place(a: Floats) -> bool:
     """Lower Cholesky factor in the lower triangle of a (n, n); False where a is not positive definite."""
     n = a.shape[0]
@@ -161,9 +168,9 @@ def facing(normal: Floats, direction: Floats) -> Floats:
     x = direction - normal * (normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2])
     x /= math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     out = np.empty((3, 3))
-    out[:, 0] = x
-    out[:, 1] = cross(normal, x)
-    out[:, 2] = normal
+    copy_into(out[:, 0], x)
+    copy_into(out[:, 1], cross(normal, x))
+    copy_into(out[:, 2], normal)
     return out
 
 

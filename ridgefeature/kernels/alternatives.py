@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import solve_in_place
+from ridgefeature.kernels.algebra import copy_into, solve_in_place
 from ridgefeature.kernels.appraise import residuals
 from ridgefeature.kernels.residual import OPTIONS
 
@@ -104,7 +104,7 @@ def advantage(
     n = len(points)
     x, y, z = points[:, 0] / half_length, points[:, 1] / half_breadth, points[:, 2].copy()
     ridge = powers(x, y, 2, 1)
-    ridge[:, 6] = (z - residuals(points, height, width, trend, table)) / height
+    copy_into(ridge[:, 6], (z - residuals(points, height, width, trend, table)) / height)
     on_ridge = robust_loss(ridge, z, scale, tuning)
     x, y, z = seen[:, 0] / half_length, seen[:, 1] / half_breadth, seen[:, 2].copy()
     smooth = robust_loss(powers(x, y, 3, 0), z, scale, tuning)

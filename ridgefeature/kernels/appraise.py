@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import solve_in_place, whitening
+from ridgefeature.kernels.algebra import copy_into, solve_in_place, whitening
 from ridgefeature.kernels.objective import pack
 from ridgefeature.kernels.residual import (
     HUBER,
@@ -158,7 +158,9 @@ def prepare(
     for i in range(r.size):
         weights[i] = weight_of(r[i] / scale, HUBER, 1.345) / (scale * scale * r.size)
     normal = np.zeros((8, 8))
-    normal[1:, 1:] = _gram(rows, weights)
+    gram = _gram(rows, weights)
+    for j in range(1, 8):
+        copy_into(normal[j, 1:], gram[j - 1])
     for j in range(8):
         normal[j, j] += prior[1, j] / r.size
     transform = whitening(normal)

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import cholesky_in_place, solve_in_place
+from ridgefeature.kernels.algebra import cholesky_in_place, copy_into, solve_in_place
 from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split
 
 Floats = NDArray[np.float64]
@@ -127,7 +127,7 @@ def found_terms(
         scale = max(1.4826 * np.median(np.abs(left)) / math.sqrt(1.0 - FREE / n), floor)
         if abs(scale - before) < _SAME_SCALE * before:
             break
-    step[:] = change[_PLACED : _PLACED + 3]
+    copy_into(step, change[_PLACED : _PLACED + 3])
     information = _inverse(_block_of_inverse(gram[:FREE, :FREE]) * (scale * scale * factor))
     return step, information, _effect(gram)
 
@@ -158,7 +158,7 @@ def _block_of_inverse(gram: Floats) -> Floats:
         column[_PLACED + j] = 1.0
         if not solve_in_place(gram.copy(), column):
             return np.zeros((3, 3))
-        out[:, j] = column[_PLACED : _PLACED + 3]
+        copy_into(out[:, j], column[_PLACED : _PLACED + 3])
     return out
 
 
@@ -188,7 +188,7 @@ def _inverse(a: Floats) -> Floats:
         column[j] = 1.0
         if not solve_in_place(a.copy(), column):
             return np.zeros((3, 3))
-        out[:, j] = column
+        copy_into(out[:, j], column)
     return 0.5 * (out + out.T)
 
 
@@ -227,6 +227,12 @@ def _times(a: Floats, b: Floats) -> Floats:
 
 
 @njit(cache=True)
+def _copy_matrix(target: Floats, values: Floats) -> None:
+    for i in range(target.shape[0]):
+        copy_into(target[i], values[i])
+
+
+@njit(cache=True)
 def smoothed(at: Floats, found: Floats, information: Floats, drift: float) -> tuple[Floats, Floats, float]:
     """Terms along a chain (n, 3) that wander by `drift` a length, their variances, the log likelihood of it.
 
@@ -244,22 +250,26 @@ def smoothed(at: Floats, found: Floats, information: Floats, drift: float) -> tu
     likelihood = 0.0
     for i in range(n):
         own = information[i] + (tie[i] + tie[i + 1]) * one
-        ahead[i], right[i] = own, _times(information[i], found[i])
+        pull = _times(information[i], found[i])
         if i > 0:
             link = _inverse(ahead[i - 1])
-            ahead[i] -= tie[i] * tie[i] * link
-            right[i] += tie[i] * _times(link, right[i - 1])
+            own -= tie[i] * tie[i] * link
+            pull += tie[i] * _times(link, right[i - 1])
             likelihood += 1.5 * math.log(tie[i])
-        likelihood -= 0.5 * _log_determinant(ahead[i])
+        likelihood -= 0.5 * _log_determinant(own)
+        _copy_matrix(ahead[i], own)
+        copy_into(right[i], pull)
     terms, variance = np.zeros((n, 3)), np.zeros((n, 3))
     for i in range(n - 1, -1, -1):
-        back[i] = information[i] + (tie[i] + tie[i + 1]) * one
+        own = information[i] + (tie[i] + tie[i + 1]) * one
         rest = right[i].copy()
+        whole = ahead[i] - own
         if i < n - 1:
-            back[i] -= tie[i + 1] * tie[i + 1] * _inverse(back[i + 1])
+            own -= tie[i + 1] * tie[i + 1] * _inverse(back[i + 1])
             rest += tie[i + 1] * terms[i + 1]
-        terms[i] = _times(_inverse(ahead[i]), rest)
-        whole = _inverse(ahead[i] + back[i] - information[i] - (tie[i] + tie[i + 1]) * one)
+        whole = _inverse(whole + own)
+        copy_into(terms[i], _times(_inverse(ahead[i]), rest))
+        _copy_matrix(back[i], own)
         for k in range(3):
             variance[i, k] = whole[k, k]
     for i in range(n):

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import cross, turned, walk
+from ridgefeature.kernels.algebra import copy_into, cross, turned, walk
 from ridgefeature.kernels.appraise import residuals
 from ridgefeature.kernels.evidence import plane_loss
 from ridgefeature.kernels.residual import OPTIONS, loss_jet
@@ -35,18 +35,22 @@ def starts(positions: Floats, frames: Floats, last_length: float, length: float)
     own = frames[k - 1, :, 0].copy()
     joint = positions[k - 1] + 0.5 * last_length * own
     ways, bends = np.empty((k, 3)), np.zeros(k)
-    ways[:] = own
+    for i in range(k):
+        copy_into(ways[i], own)
     if k == 2:
-        ways[1] = positions[1] - positions[0]
+        copy_into(ways[1], positions[1] - positions[0])
     if k == 3:
         chord, earlier = positions[2] - positions[1], positions[1] - positions[0]
         step, step_before = math.sqrt((chord * chord).sum()), math.sqrt((earlier * earlier).sum())
         turn = math.atan2((normal * cross(earlier, chord)).sum(), (earlier * chord).sum())
         bends[0] = bends[1] = 2.0 * turn / (step + step_before)
-        ways[0] = turned(chord, normal, 0.5 * step * bends[0])
+        copy_into(ways[0], turned(chord, normal, 0.5 * step * bends[0]))
     places, axes = np.empty((k, 3)), np.empty((k, 3, 3))
     for i in range(k):
-        places[i], axes[i] = walk(joint, normal, ways[i], bends[i], 0.5 * last_length, 0.5 * length)
+        place, frame = walk(joint, normal, ways[i], bends[i], 0.5 * last_length, 0.5 * length)
+        copy_into(places[i], place)
+        for j in range(3):
+            copy_into(axes[i, j], frame[j])
     return places, axes
 
 
@@ -86,7 +90,7 @@ def _levelled(points: Floats, width: float, trend: Floats, scale: float, loss: i
     for i in range(n):
         x, y = points[i, 0], points[i, 1]
         if abs(y - 0.5 * trend[0] * x * x) > 0.5 * max(width + trend[2] * x, 0.1 * width):
-            outside[m] = points[i]
+            copy_into(outside[m], points[i])
             m += 1
     out = points.copy()
     if m >= _FEWEST_OUTSIDE:

@@ -16,6 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.algebra import copy_into
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Cells = NDArray[np.int32]
@@ -144,5 +146,5 @@ def probe_cells(points: Floats, starts: Cells, levels: Ints, frame: Floats, cell
             key -= np.floor(key)
             if key < least or (key == least and before(points, j, points, chosen)):
                 chosen, least = j, key
-        out[i] = points[chosen]
+        copy_into(out[i], points[chosen])
     return out

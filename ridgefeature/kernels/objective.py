@@ -17,7 +17,7 @@ from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import rotation_of
+from ridgefeature.kernels.algebra import copy_into, rotation_of
 from ridgefeature.kernels.residual import (
     CAUCHY,
     HUBER,
@@ -54,15 +54,15 @@ def pack(
     n, rows = points.shape[0], table.shape[0]
     out = np.empty(_TABLE + 4 * rows + 3 * n)
     out[0], out[1], out[2], out[3], out[4], out[5] = out.size, n, rows, loss, tuning, scale
-    out[_START:_PRIOR] = start
-    out[_PRIOR:_TREND] = prior.ravel()
-    out[_TREND:_TRANSFORM] = trend
-    out[_TRANSFORM:_TABLE] = transform.ravel()
+    copy_into(out[_START:_PRIOR], start)
+    copy_into(out[_PRIOR:_TREND], prior.ravel())
+    copy_into(out[_TREND:_TRANSFORM], trend)
+    copy_into(out[_TRANSFORM:_TABLE], transform.ravel())
     for j in range(4):
-        out[_TABLE + j * rows : _TABLE + (j + 1) * rows] = table[:, j]
+        copy_into(out[_TABLE + j * rows : _TABLE + (j + 1) * rows], table[:, j])
     at = _TABLE + 4 * rows
     for j in range(3):
-        out[at + j * n : at + (j + 1) * n] = points[:, j]
+        copy_into(out[at + j * n : at + (j + 1) * n], points[:, j])
     return out
 
 

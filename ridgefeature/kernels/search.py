@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import cross, solve_in_place
+from ridgefeature.kernels.algebra import copy_into, cross, solve_in_place
 
 Floats = NDArray[np.float64]
 _SWEEPS = 12
@@ -108,7 +108,7 @@ def best_straight_ridge(
             explained = height * height * spread / left
             if explained > best[0]:
                 best[0], best[1], best[2], best[3] = explained, angle, offset, height
-                best[4:] = plane - height * follows
+                copy_into(best[4:], plane - height * follows)
     return best
 
 
@@ -142,6 +142,6 @@ def principal_axes(points: Floats) -> Floats:
     order = np.argsort(np.array([-a[0, 0], -a[1, 1], -a[2, 2]]))
     out = np.empty((3, 3))
     for j in range(2):
-        out[:, j] = axes[:, order[j]]
-    out[:, 2] = cross(out[:, 0], out[:, 1])
+        copy_into(out[:, j], axes[:, order[j]])
+    copy_into(out[:, 2], cross(out[:, 0], out[:, 1]))
     return out

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.algebra import copy_into
+
 Floats = NDArray[np.float64]
 Spline = tuple[Floats, Floats, Floats, int, int]  # poles (nu, nv, 3), knots_u, knots_v, degree_u, degree_v
 
@@ -194,8 +196,9 @@ def _foot(
             break
         step = abs(nu - u) / (u1 - u0) + abs(nv - v) / (v1 - v0)
         u, v, f = nu, nv, g
-        now[:, :] = then
-        r[:] = q
+        for i in range(6):
+            copy_into(now[i], then[i])
+        copy_into(r, q)
         if step < 1e-8 or -slope <= 1e-28 * f:  # Newton squares the error: the next step would be rounding
             break
     return u, v

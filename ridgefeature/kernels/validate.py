@@ -4,6 +4,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.algebra import copy_into
+
 Array = NDArray[np.float64]
 
 # Beyond this a squared distance may overflow, so such a coordinate counts as not finite.
@@ -26,8 +28,8 @@ def finite_bounds(points: Array) -> tuple[int, Array]:
         x_low, x_high = min(x_low, x), max(x_high, x)
         y_low, y_high = min(y_low, y), max(y_high, y)
         z_low, z_high = min(z_low, z), max(z_high, z)
-    bounds[0, :] = x_low, y_low, z_low
-    bounds[1, :] = x_high, y_high, z_high
+    bounds[0, 0], bounds[0, 1], bounds[0, 2] = x_low, y_low, z_low
+    bounds[1, 0], bounds[1, 1], bounds[1, 2] = x_high, y_high, z_high
     return bad, bounds
 
 
@@ -53,7 +55,7 @@ def distinct_points(points: Array, enough: int) -> int:
                 new = False
                 break
         if new:
-            seen[count] = points[i]
+            copy_into(seen[count], points[i])
             count += 1
             if count == enough:
                 break
@@ -109,6 +111,6 @@ def ball_points(points: Array, centre: Array, radius: float, count: int) -> Arra
     for i in range(points.shape[0]):
         x, y, z = points[i, 0] - centre[0], points[i, 1] - centre[1], points[i, 2] - centre[2]
         if x * x + y * y + z * z <= limit:
-            found[k] = points[i]
+            copy_into(found[k], points[i])
             k += 1
     return found

@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from .algebra import copy_into
 from .grid import LIMIT, Cells, Floats, Ints, before, cell_index
 
 
@@ -230,7 +231,7 @@ def ball_points(
                             points[j, 1] - centre[1],
                             points[j, 2] - centre[2],
                         )
-                        out[m] = points[j]
+                        copy_into(out[m], points[j])
                         m += dx * dx + dy * dy + dz * dz <= radius * radius
                     _sort_rows(out, run, m)
         if fill == 0:
