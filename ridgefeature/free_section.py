@@ -62,7 +62,8 @@ def free_section(
     evenness. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
     """
     matrix, right = section_sums(points, terms, section.table, *noise, spans, wider)
-    if not (np.isfinite(matrix).all() and (np.diagonal(matrix)[-3:] > 0).all()):
+    told = np.diagonal(matrix)
+    if not (np.isfinite(matrix).all() and (told[-3:] > 0).all() and (told[:-3] > 0).any()):
         return None
     found, freedom = _smoothest(matrix, right, spans)
     if not found[3:-6].max() > 0:

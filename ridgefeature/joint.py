@@ -24,6 +24,8 @@ _ENOUGH = 5000
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
 _SOME_STRAYS = 0.05
+_EXACT = 5e-3
+"""Least noise, in apex heights: splines are no nearer to a real ridge, and what they miss is no stray."""
 _BLOCK = 5
 """Nodes over which noise may be correlated."""
 _MEDIAN = 0.89
@@ -100,10 +102,11 @@ def fit_whole(
     middle, wanted = 0.5 * (path.knots[1:] + path.knots[:-1]), _wanted(path)
     even, inflation = _evenness(points, terms, section), 1.0
     scale, strays = _first_noise(points, terms, section, h, w)
+    span = _span(h, w)
     shaping = settings.section in ("auto", "learned")
     for n in range(rounds):
         distances = offsets(points, terms, section.table)
-        scale, strays, density = mixture(distances, scale, strays, 4.0 * h + 0.5 * w, _NEXT_MIXTURE)
+        scale, strays, density = mixture(distances, scale, strays, span, _EXACT * h, _NEXT_MIXTURE)
         matrix, right, sums = information(points, terms, section.table, scale, density, even)
         gain = sums[3] ** 2 / (sums[2] * sums[1])
         if not np.isfinite(matrix).all() or not np.isfinite(gain):
@@ -153,9 +156,14 @@ def _shaped(
 def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> tuple[float, float]:
     """Noise scale and share of strays, from some of the points."""
     distances = offsets(points[:: 1 + len(points) // _ENOUGH], terms, section.table)
-    scale = max(1.4826 * float(np.median(np.abs(distances))), 1e-4 * h)
-    found = mixture(distances, scale, _SOME_STRAYS, 4.0 * h + 0.5 * w, _FIRST_MIXTURE)
+    scale = max(1.4826 * float(np.median(np.abs(distances))), _EXACT * h)
+    found = mixture(distances, scale, _SOME_STRAYS, _span(h, w), _EXACT * h, _FIRST_MIXTURE)
     return found[0], found[1]
+
+
+def _span(h: float, w: float) -> float:
+    """How far above and below the base points are looked at, as in PathFrame.tall."""
+    return 4.0 * h + 0.5 * w
 
 
 def _wanted(path: PathFrame) -> Array:

@@ -134,11 +134,11 @@ def test_height_and_width_have_no_bias_under_much_noise(strays):
     points, terms = scene(noise, strays, h)
     for _ in range(8):
         r = offsets(points, terms, bell().table)
-        scale, share, density = mixture(r, 1.5 * float(np.median(np.abs(r))), 0.05, 4 * h + 0.5, 20)
+        scale, share, density = mixture(r, 1.5 * float(np.median(np.abs(r))), 0.05, 4 * h + 0.5, 1e-3 * h, 20)
         matrix, right, _ = information(points, terms, bell().table, scale, density, 0.0)
         terms = terms + np.linalg.solve(matrix.sum(axis=0), right.sum(axis=0))
     assert terms[0, H] == pytest.approx(h, rel=3e-3)
-    assert terms[0, W] == pytest.approx(1.0, rel=4e-3)
+    assert terms[0, W] == pytest.approx(1.0, rel=3e-3 + 0.01 * strays)
     assert scale == pytest.approx(noise, rel=0.06)
     # Strays that lie among the others are not told from them.
     assert share == pytest.approx(strays, abs=0.05)

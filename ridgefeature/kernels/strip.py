@@ -49,44 +49,20 @@ def rectified(
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         for j in range(n):
-            ahead[j] = (
-                (x - origin[j, 0]) * tangent[j, 0]
-                + (y - origin[j, 1]) * tangent[j, 1]
-                + (z - origin[j, 2]) * tangent[j, 2]
-            )
+            ahead[j] = _along(x, y, z, origin, tangent, j)
         best = -1.0
         for j in range(n - 1):
             if not ahead[j] >= 0.0 > ahead[j + 1]:
                 continue
-            dx, dy, dz = (
-                origin[j + 1, 0] - origin[j, 0],
-                origin[j + 1, 1] - origin[j, 1],
-                origin[j + 1, 2] - origin[j, 2],
-            )
-            step = math.sqrt(dx * dx + dy * dy + dz * dz)
+            step = _distance(origin, j)
             span = ahead[j] - ahead[j + 1]
             if span < _LEAST_STEP * step:
                 continue
             u = ahead[j] / span
             v = 1.0 - u
-            # The cubic that starts and ends along the tangents (Hermite), so that the path has no corners.
-            k0, k1 = step * u * v * v, -step * u * u * v
-            along = u * u * (3.0 - 2.0 * u)
-            px = x - origin[j, 0] - along * dx - k0 * tangent[j, 0] - k1 * tangent[j + 1, 0]
-            py = y - origin[j, 1] - along * dy - k0 * tangent[j, 1] - k1 * tangent[j + 1, 1]
-            pz = z - origin[j, 2] - along * dz - k0 * tangent[j, 2] - k1 * tangent[j + 1, 2]
-            lx, ly, lz = (
-                v * left[j, 0] + u * left[j + 1, 0],
-                v * left[j, 1] + u * left[j + 1, 1],
-                v * left[j, 2] + u * left[j + 1, 2],
-            )
-            nx, ny, nz = (
-                v * normal[j, 0] + u * normal[j + 1, 0],
-                v * normal[j, 1] + u * normal[j + 1, 1],
-                v * normal[j, 2] + u * normal[j + 1, 2],
-            )
-            side = (px * lx + py * ly + pz * lz) / math.sqrt(lx * lx + ly * ly + lz * lz)
-            over = (px * nx + py * ny + pz * nz) / math.sqrt(nx * nx + ny * ny + nz * nz)
+            px, py, pz = _from_path(x, y, z, origin, tangent, j, u, step)
+            side = _on_mean(px, py, pz, left, j, u)
+            over = _on_mean(px, py, pz, normal, j, u)
             bend = v * curvature[j] + u * curvature[j + 1]
             if abs(bend) * (abs(side) + abs(over)) > 1e-9:
                 # Unrolled: the base is an arc of a circle, heights are along its radii.
@@ -104,6 +80,56 @@ def rectified(
         if best >= 0.0:
             m += 1
     return out[:m]
+
+
+@njit(**INNER)
+def _along(x: float, y: float, z: float, origin: Floats, tangent: Floats, j: int) -> float:
+    """How far a point lies ahead of the j-th node."""
+    return (
+        (x - origin[j, 0]) * tangent[j, 0]
+        + (y - origin[j, 1]) * tangent[j, 1]
+        + (z - origin[j, 2]) * tangent[j, 2]
+    )
+
+
+@njit(**INNER)
+def _distance(origin: Floats, j: int) -> float:
+    """From the j-th node to the next."""
+    dx, dy, dz = (
+        origin[j + 1, 0] - origin[j, 0],
+        origin[j + 1, 1] - origin[j, 1],
+        origin[j + 1, 2] - origin[j, 2],
+    )
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(**INNER)
+def _from_path(
+    x: float, y: float, z: float, origin: Floats, tangent: Floats, j: int, u: float, step: float
+) -> tuple[float, float, float]:
+    """From the path, a part u of the way from the j-th node to the next, to a point.
+
+    It is the cubic that starts and ends along the tangents (Hermite), so that the path has no corners.
+    """
+    v = 1.0 - u
+    k0, k1 = step * u * v * v, -step * u * u * v
+    ahead = u * u * (3.0 - 2.0 * u)
+    back = 1.0 - ahead
+    return (
+        x - back * origin[j, 0] - ahead * origin[j + 1, 0] - k0 * tangent[j, 0] - k1 * tangent[j + 1, 0],
+        y - back * origin[j, 1] - ahead * origin[j + 1, 1] - k0 * tangent[j, 1] - k1 * tangent[j + 1, 1],
+        z - back * origin[j, 2] - ahead * origin[j + 1, 2] - k0 * tangent[j, 2] - k1 * tangent[j + 1, 2],
+    )
+
+
+@njit(**INNER)
+def _on_mean(px: float, py: float, pz: float, axes: Floats, j: int, u: float) -> float:
+    """A vector along the axis between those of the j-th node and of the next."""
+    v = 1.0 - u
+    ax = v * axes[j, 0] + u * axes[j + 1, 0]
+    ay = v * axes[j, 1] + u * axes[j + 1, 1]
+    az = v * axes[j, 2] + u * axes[j + 1, 2]
+    return (px * ax + py * ay + pz * az) / math.sqrt(ax * ax + ay * ay + az * az)
 
 
 Terms = tuple[float, float, float, float, float, float]
@@ -175,13 +201,15 @@ def offsets(points: Floats, terms: Floats, table: Floats) -> Floats:
 
 
 @njit(**OPTIONS)
-def mixture(r: Floats, scale: float, share: float, span: float, rounds: int) -> tuple[float, float, float]:
+def mixture(
+    r: Floats, scale: float, share: float, span: float, least: float, rounds: int
+) -> tuple[float, float, float]:
     """Noise scale and share of strays, and the density of strays over that of the others at their middle.
 
     Residuals r (n,) are a mixture of a normal distribution and strays spread evenly over `span` (Dempster,
-    Laird and Rubin 1977), to begin with of this scale and this share of strays.
+    Laird and Rubin 1977), to begin with of this scale and this share of strays. least: of the
+    scale.
     """
-    least = 1e-3 * scale
     stray = 0.0
     for _ in range(rounds):
         stray = share / (1.0 - share) * math.sqrt(2.0 * math.pi) * scale / span
