@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 4
 _FIRST_MIXTURE, _NEXT_MIXTURE = 15, 3
+MOST_POINTS, SOME_POINTS = 300_000, 20_000
+"""As many are looked at in the last round, and before it."""
 _ENOUGH = 5000
 """Points that tell the noise well enough to begin with."""
 _START = 0.02
@@ -34,6 +36,22 @@ _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
 
+@dataclass(frozen=True)
+class Noise:
+    """Distances of points from the surface: normal, and those of strays, spread evenly."""
+
+    scale: float
+    """Standard deviation of those that are no strays."""
+    strays: float
+    """Share of points that are strays."""
+    density: float
+    """Of strays, by that of the others at their middle."""
+    span: float
+    """Distances that strays may have, in all."""
+    even: float
+    """0 where points lie evenly over the base, 1 where evenly over the surface."""
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
     """A ridge fitted as a whole: terms (n, 6) at the nodes of its path, and how sure they are."""
@@ -45,10 +63,7 @@ class Joint:
     matrix: Array
     goal: Array
     """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
-    scale: float
-    """Noise: standard deviation of the distances of points that are no strays."""
-    strays: float
-    """Share of points that are strays."""
+    noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
 
@@ -84,15 +99,18 @@ def fit_whole(
     weights: Array | None = None,
     rounds: int = 3,
     flat: bool = False,
+    most: int = MOST_POINTS,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     weights (6,): of the penalties of an earlier fit, to begin with. rounds: of which the last does not change
-    the section any more. flat: the base stays as curved across as the path has it.
+    the section any more. flat: the base stays as curved across as the path has it. most: about as many
+    points are looked at.
     """
-    points = points_along(grid, path, (0.5 + settings.flank) * path.width)
+    points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
     if len(points) < _FEWEST:
         return None
+    some = points[:: 1 + len(points) // SOME_POINTS]
     h, w = float(np.median(np.abs(path.height))), float(np.median(path.width))
     if weights is None:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
@@ -100,32 +118,39 @@ def fit_whole(
     terms[:, H], terms[:, W] = path.height, path.width
     first, basis = basis_at(path.coefficients, path.knots)
     middle, wanted = 0.5 * (path.knots[1:] + path.knots[:-1]), _wanted(path)
-    even, inflation = _evenness(points, terms, section), 1.0
-    scale, strays = _first_noise(points, terms, section, h, w)
-    span = _span(h, w)
+    noise, inflation = _first_noise(some, terms, section, h, w), 1.0
     shaping = settings.section in ("auto", "learned")
     for n in range(rounds):
-        distances = offsets(points, terms, section.table)
-        scale, strays, density = mixture(distances, scale, strays, span, _EXACT * h, _NEXT_MIXTURE)
-        matrix, right, sums = information(points, terms, section.table, scale, density, even)
-        gain = sums[3] ** 2 / (sums[2] * sums[1])
+        last = n == rounds - 1
+        matrix, goal, noise, gain = _linearised(points if last else some, terms, section, noise, _EXACT * h)
         if not np.isfinite(matrix).all() or not np.isfinite(gain):
             return None
         if n > 0:
-            inflation = _inflation(gain * matrix, gain * right)
-        gain /= inflation
+            inflation = _inflation(gain * matrix, gain * goal)
         at = 0.5 * (terms[1:] + terms[:-1])
-        matrix, goal = gain * matrix, gain * (right + np.einsum("nij,nj->ni", matrix, at))
+        goal += np.einsum("nij,nj->ni", matrix, at)
+        matrix, goal = gain / inflation * matrix, gain / inflation * goal
         if flat:
             _fix(matrix, goal, C)
         smooth = smoothest(matrix, goal, middle, path.coefficients, wanted, weights)
         weights = smooth.weights
         terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
         terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-        if shaping and n < rounds - 1:
-            new, terms = _shaped(points, terms, section, (scale, density, even), inflation)
+        if shaping and not last:
+            new, terms = _shaped(some, terms, section, noise, inflation)
             shaping, section = new is not section, new
-    return Joint(path, smooth, terms, section, matrix, goal, scale, strays, inflation)
+    return Joint(path, smooth, terms, section, matrix, goal, noise, inflation)
+
+
+def _linearised(
+    points: Array, terms: Array, section: Section, noise: Noise, least: float
+) -> tuple[Array, Array, Noise, float]:
+    """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood."""
+    distances = offsets(points, terms, section.table)
+    scale, strays, density = mixture(distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
+    matrix, right, sums = information(points, terms, section.table, scale, density, noise.even)
+    gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
+    return matrix, right, replace(noise, scale=scale, strays=strays, density=density), gain
 
 
 def _fix(matrix: Array, goal: Array, term: int) -> None:
@@ -135,13 +160,13 @@ def _fix(matrix: Array, goal: Array, term: int) -> None:
 
 
 def _shaped(
-    points: Array, terms: Array, section: Section, noise: tuple[float, float, float], inflation: float
+    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
 ) -> tuple[Section, Array]:
     """The section and terms, or a free section and its terms where that is better beyond doubt."""
     price, best, kept = np.log(len(points)), 0.0, (section, terms)
     wider = 1.0 if section.name == FREE else WIDER
     for spans in SPANS:
-        found = free_section(points, terms, section, noise, spans, wider)
+        found = free_section(points, terms, section, (noise.scale, noise.density, noise.even), spans, wider)
         if found is None:
             continue
         cost = price * found.freedom
@@ -153,17 +178,13 @@ def _shaped(
     return kept
 
 
-def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> tuple[float, float]:
-    """Noise scale and share of strays, from some of the points."""
+def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> Noise:
+    """The noise as some of the points tell it."""
     distances = offsets(points[:: 1 + len(points) // _ENOUGH], terms, section.table)
     scale = max(1.4826 * float(np.median(np.abs(distances))), _EXACT * h)
-    found = mixture(distances, scale, _SOME_STRAYS, _span(h, w), _EXACT * h, _FIRST_MIXTURE)
-    return found[0], found[1]
-
-
-def _span(h: float, w: float) -> float:
-    """How far above and below the base points are looked at, as in PathFrame.tall."""
-    return 4.0 * h + 0.5 * w
+    span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
+    scale, strays, density = mixture(distances, scale, _SOME_STRAYS, span, _EXACT * h, _FIRST_MIXTURE)
+    return Noise(scale, strays, density, span, _evenness(points, terms, section))
 
 
 def _wanted(path: PathFrame) -> Array:

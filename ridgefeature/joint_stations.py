@@ -11,7 +11,7 @@ from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.free_section import FREE, trimmed
 from ridgefeature.grid import Grid
-from ridgefeature.joint import Joint, fit_whole
+from ridgefeature.joint import MOST_POINTS, SOME_POINTS, Joint, fit_whole
 from ridgefeature.kernels.strip import A, C, E, H, W
 from ridgefeature.path_frame import PathFrame, path_frame, unit
 from ridgefeature.section import Section
@@ -26,6 +26,7 @@ _BENT = 4.5
 """Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
 _NARROWEST = 0.2
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
+_LAST_ROUNDS = 3
 _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
@@ -62,7 +63,8 @@ def _fit(
     grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None, flat: bool
 ) -> Joint | None:
     """The whole fit along a path, if it is sound, its section between its feet."""
-    joint = fit_whole(grid, path, section, settings, weights, 4 if weights is None else 3, flat)
+    rounds, most = (4, SOME_POINTS) if weights is None else (_LAST_ROUNDS, MOST_POINTS)
+    joint = fit_whole(grid, path, section, settings, weights, rounds, flat, most)
     if joint is None or not _sound(joint):
         return None
     return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint
@@ -81,7 +83,7 @@ def _between_ends(
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
     fixed = replace(settings, section="bell")  # kept as it is
-    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2, flat)
+    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations
     start, end = ends_of(wide, 0.0, length, open_ends)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 NODES_A_WIDTH = 10
 _KNOTS_A_WIDTH = 2.0
 _FEWEST_SPANS = 4
-_TOGETHER = 8
+_TOGETHER = 12
 """Nodes between which points are looked up together."""
 _OVERLAP = 1.5
 """How far a ring's path runs on beyond its seam at both ends, in widths."""
@@ -134,32 +134,56 @@ def _rotation(vector: Array) -> Array:
     return rotation_of(vector)[0]
 
 
-def points_along(grid: Grid, path: PathFrame, reach: Array) -> Array:
-    """Coordinates (m, 3) as in kernels.strip of the points up to `reach` (n,) from the path."""
+def points_along(grid: Grid, path: PathFrame, reach: Array, most: int) -> Array:
+    """Coordinates (m, 3) as in kernels.strip of the points up to `reach` (n,) from the path.
+
+    Of more than about `most` only every second, third ... is taken.
+    """
     last = len(path.at) - 1
-    parts = [_between(grid, path, reach, i, min(i + _TOGETHER, last)) for i in range(0, last, _TOGETHER)]
-    return np.concatenate(parts)
-
-
-def _between(grid: Grid, path: PathFrame, reach: Array, first: int, last: int) -> Array:
-    own, middle = slice(first, last + 1), (first + last) // 2
-    axes = np.stack([path.tangent[middle], path.left[middle], path.normal[middle]])
-    origin = (path.origin[own] - path.origin[middle]) @ axes.T
-    tangent, left, normal = (x[own] @ axes.T for x in (path.tangent, path.left, path.normal))
-    bend, tall, far = path.curvature[own], path.tall[own], reach[own]
-    corners = np.concatenate(
+    runs = [slice(i, min(i + _TOGETHER, last) + 1) for i in range(0, last, _TOGETHER)]
+    corners = _corners(path, reach)
+    boxes = [_box(grid, path, corners, run) for run in runs]
+    every = 1 + sum(len(points) for points, _ in boxes) // most
+    return np.concatenate(
         [
-            origin
-            + (y * far * (1.0 - z * tall * bend))[:, None] * left
-            + (z * tall + 0.5 * bend * (y * far) ** 2)[:, None] * normal
-            for y in (-1.0, 0.0, 1.0)
-            for z in (-1.0, 1.0)
+            _rectified(path, reach, run, points[::every], centre)
+            for run, (points, centre) in zip(runs, boxes, strict=True)
         ]
     )
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    centre, half = 0.5 * (low + high), 0.505 * (high - low) + 1e-9 * far.max()
-    found = points_in_box(grid, path.origin[middle] + centre @ axes, axes, half, check=False)
-    return rectified(found, origin - centre, tangent, left, normal, bend, far, tall, first)
+
+
+def _corners(path: PathFrame, reach: Array) -> Array:
+    """(n, 6, 3) what the points near each node lie between: above and below sides and middle of the base."""
+    sides = np.array([-1.0, -1.0, 0.0, 0.0, 1.0, 1.0]) * reach[:, None]
+    up = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]) * path.tall[:, None]
+    bend = path.curvature[:, None]
+    left, normal = path.left[:, None], path.normal[:, None]
+    aside, over = sides * (1.0 - up * bend), up + 0.5 * bend * sides**2
+    return np.asarray(path.origin[:, None] + aside[:, :, None] * left + over[:, :, None] * normal)
+
+
+def _axes(path: PathFrame, run: slice) -> tuple[Array, Array]:
+    """Origin (3,) and axes (3, 3) of the node in the middle of a run of nodes."""
+    middle = (run.start + run.stop - 1) // 2
+    return path.origin[middle], np.stack([path.tangent[middle], path.left[middle], path.normal[middle]])
+
+
+def _box(grid: Grid, path: PathFrame, corners: Array, run: slice) -> tuple[Array, Array]:
+    """The points (m, 3) of the box around a run of nodes, in its frame, and its centre (3,) in the run's."""
+    origin, axes = _axes(path, run)
+    own = (corners[run].reshape(-1, 3) - origin) @ axes.T
+    low, high = own.min(axis=0), own.max(axis=0)
+    centre, half = 0.5 * (low + high), 0.505 * (high - low) + 1e-9 * (high - low).max()
+    return points_in_box(grid, origin + centre @ axes, axes, half, check=False), centre
+
+
+def _rectified(path: PathFrame, reach: Array, run: slice, points: Array, centre: Array) -> Array:
+    origin, axes = _axes(path, run)
+    nodes = (path.origin[run] - origin) @ axes.T - centre
+    tangent, left, normal = (x[run] @ axes.T for x in (path.tangent, path.left, path.normal))
+    return rectified(
+        points, nodes, tangent, left, normal, path.curvature[run], reach[run], path.tall[run], run.start
+    )
 
 
 def unit(vectors: Array) -> Array:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import local_basis
-from ridgefeature.kernels.penalised import assembled, most_likely
+from ridgefeature.kernels.penalised import assembled, changed_band, most_likely
 from ridgefeature.kernels.strip import TERMS
 
 Floats = NDArray[np.float64]
 
 ORDERS = (3, 2, 1, 3, 2, 2)
 """Order of the differences that are kept small, of each term: offsets follow a smooth curvature."""
-_ROUNDS = 5
+_ROUNDS = 3
 _SAME = 0.1
 
 
@@ -48,30 +48,7 @@ class Smooth:
 
     def changed(self, change: Floats) -> Smooth:
         """The same for other terms, `change` (6, 6) times these."""
-        n, m = self.covariance.shape
-        covariance = np.zeros_like(self.covariance)
-        blocks = np.zeros((n // TERMS, m // TERMS, TERMS, TERMS))
-        for i in range(TERMS):
-            for k in range(m):
-                whole = np.arange(i, n, TERMS)
-                other = whole - k
-                ok = other >= 0
-                step = (whole // TERMS - other // TERMS)[ok]
-                near = step < m // TERMS
-                blocks[whole[ok][near] // TERMS, step[near], i, other[ok][near] % TERMS] = self.covariance[
-                    whole[ok][near], k
-                ]
-        # Within one place the band holds but the lower half.
-        upper = np.triu_indices(TERMS, 1)
-        blocks[:, 0][:, upper[0], upper[1]] = np.swapaxes(blocks[:, 0], 1, 2)[:, upper[0], upper[1]]
-        blocks = np.einsum("ij,nbjk,lk->nbil", change, blocks, change)
-        for i in range(TERMS):
-            for k in range(m):
-                whole = np.arange(i, n, TERMS)
-                other = whole - k
-                ok = (other >= 0) & (whole // TERMS - other // TERMS < m // TERMS)
-                w, o = whole[ok], other[ok]
-                covariance[w, k] = blocks[w // TERMS, w // TERMS - o // TERMS, i, o % TERMS]
+        covariance = changed_band(self.covariance, np.ascontiguousarray(change))
         return Smooth(self.coefficients @ change.T, covariance, self.weights)
 
 

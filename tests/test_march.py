@@ -50,18 +50,21 @@ def test_the_spiral_is_covered_and_both_ends_lie_within_one_width(n, noise, seed
     assert abs(high - total) < SPIRAL.width(total)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_height_and_width_agree_with_the_truth_within_their_bands(seed):
-    found = spiral_ridge(seed=seed)
-    s = on_path(found)
-    inside = (s > 0) & (s < SPIRAL.arc_length)
-    for value, std, truth in (
-        (found.height, found.height_std, SPIRAL.height),
-        (found.width, found.width_std, SPIRAL.width),
-    ):
-        deviation = ((value - truth(s)) / std)[inside]
-        assert np.abs(deviation).max() < 4.5
-        assert 0.6 < deviation.std() < 1.5  # 25 templates: a standard deviation is known to 15 %
+def test_height_and_width_agree_with_the_truth_within_their_bands():
+    """Errors are smooth along a ridge, so that one alone does not tell whether the bands are right."""
+    pooled = []
+    for seed in range(1, 9):
+        found = spiral_ridge(seed=seed)
+        s = on_path(found)
+        inside = (s > 0) & (s < SPIRAL.arc_length)
+        height = (found.height - SPIRAL.height(s)) / found.height_std
+        width = (found.width - SPIRAL.width(s)) / found.width_std
+        pooled.append(np.stack([height, width])[:, inside])
+    deviation = np.concatenate(pooled, axis=1)
+    assert np.abs(deviation).max() < 4.5
+    # Of some ten independent values a ridge: a standard deviation is known to 8 %.
+    assert ((0.8 < deviation.std(axis=1)) & (deviation.std(axis=1) < 1.2)).all()
+    assert (np.abs(deviation.mean(axis=1)) < 0.35).all()
 
 
 def test_the_spine_follows_the_circle_and_the_frame_is_orthonormal(ridge):

@@ -135,3 +135,25 @@ def most_likely(
         if change < same:
             break
     return found.reshape(n, TERMS), inverse, lam
+
+
+@njit(**OPTIONS)
+def changed_band(band: Floats, change: Floats) -> Floats:
+    """The band (6 n, 24) of a covariance for other terms, `change` (6, 6) times these."""
+    out = np.zeros_like(band)
+    half = np.empty((TERMS, TERMS))
+    for i in range(band.shape[0] // TERMS):
+        for j in range(max(0, i - 3), i + 1):
+            for p in range(TERMS):
+                for q in range(TERMS):
+                    half[p, q] = 0.0
+                    for r in range(TERMS):
+                        one, other = TERMS * i + r, TERMS * j + q
+                        half[p, q] += change[p, r] * band[max(one, other), abs(one - other)]
+            for p in range(TERMS):
+                for q in range(TERMS):
+                    one, other = TERMS * i + p, TERMS * j + q
+                    if other <= one:
+                        for r in range(TERMS):
+                            out[one, one - other] += half[p, r] * change[q, r]
+    return out
