@@ -20,7 +20,7 @@ WIDER = 1.25
 FREE = "free"
 _FOOT = 0.012
 """Height at which a section begins, in apex heights."""
-_ROUNDS = 12
+_ROUNDS = 8
 _LEAST_SPANS = 20
 
 
@@ -99,13 +99,9 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float]:
         found = inverse @ right
         rough = float(((d @ found) ** 2).sum())
         free = max(n - 2 - lam * float((penalty * inverse).sum()), 1e-2)
-        new = float(
-            np.clip(free / max(rough, 1e-300), max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size))
-        )
-        done = abs(np.log(new / lam)) < 0.05
-        lam = new
-        if done:
-            break
+        # Always as many rounds: stopping early would let rounding decide on the result.
+        low, high = max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)
+        lam = float(np.clip(free / max(rough, 1e-300), low, high))
     return found, free
 
 

@@ -63,6 +63,8 @@ class Joint:
     matrix: Array
     goal: Array
     """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
+    counts: Array
+    """(n - 1,) points of each stretch, strays too."""
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
@@ -139,7 +141,8 @@ def fit_whole(
         if shaping and not last:
             new, terms = _shaped(some, terms, section, noise, inflation)
             shaping, section = new is not section, new
-    return Joint(path, smooth, terms, section, matrix, goal, noise, inflation)
+    counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
+    return Joint(path, smooth, terms, section, matrix, goal, counts.astype(np.float64), noise, inflation)
 
 
 def _linearised(

@@ -26,7 +26,7 @@ _BENT = 4.5
 """Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
 _NARROWEST = 0.2
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
-_LAST_ROUNDS = 3
+_FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
@@ -63,7 +63,7 @@ def _fit(
     grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None, flat: bool
 ) -> Joint | None:
     """The whole fit along a path, if it is sound, its section between its feet."""
-    rounds, most = (4, SOME_POINTS) if weights is None else (_LAST_ROUNDS, MOST_POINTS)
+    rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if weights is None else (_LAST_ROUNDS, MOST_POINTS)
     joint = fit_whole(grid, path, section, settings, weights, rounds, flat, most)
     if joint is None or not _sound(joint):
         return None

@@ -20,7 +20,6 @@ Floats = NDArray[np.float64]
 ORDERS = (3, 2, 1, 3, 2, 2)
 """Order of the differences that are kept small, of each term: offsets follow a smooth curvature."""
 _ROUNDS = 3
-_SAME = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,5 +77,5 @@ def smoothest(
     """
     first, basis = basis_at(n, places)
     band, right = assembled(matrix, goal, first, basis, n)
-    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, _ROUNDS, _SAME)
+    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, _ROUNDS)
     return Smooth(found, inverse, lam)

@@ -68,7 +68,7 @@ def ends_of(joint: Joint, start: float, end: float, open_ends: tuple[bool, bool]
     found, height = evidence(joint, one)
     half, above = evidence(joint, one // 2)
     half = np.where(above * np.median(path.height[path.at > 0]) > 0, half, 0.0)
-    count = _windows(joint.matrix[:, A, A], near) / _windows(path.width[1:] ** 2, near)
+    count = _windows(joint.counts, near) / _windows(path.width[1:] ** 2, near)
     inside = (path.at >= start) & (path.at <= end)
     dense = count > _DENSE * np.median(count[inside[:-near]])
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])

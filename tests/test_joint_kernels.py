@@ -50,7 +50,7 @@ def test_smoothing_finds_straight_lines_exactly_and_what_is_wanted():
     line = places[:, None] * np.arange(1, TERMS + 1)
     band, right = assembled(goal, line, first, basis, n)
     wanted = np.zeros((TERMS, n))
-    found, _, weights = most_likely(band, right, np.array(ORDERS), wanted, np.ones(TERMS), 30, 0.01)
+    found, _, weights = most_likely(band, right, np.array(ORDERS), wanted, np.ones(TERMS), 30)
     values = (basis[:, :, None] * found[first[:, None] + np.arange(4)]).sum(axis=1)
     order_1 = ORDERS.index(1)
     others = [k for k in range(TERMS) if k != order_1]
@@ -71,7 +71,6 @@ def test_the_smoothness_is_that_of_the_data():
         np.zeros((TERMS, n)),
         np.ones(TERMS),
         50,
-        0.01,
     )
     values = (basis * found[first[:, None] + np.arange(4), H]).sum(axis=1)
     assert np.sqrt(np.mean((values - curve) ** 2)) < 0.1 * np.sqrt(n / m)

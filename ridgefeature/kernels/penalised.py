@@ -6,8 +6,6 @@ Marx 1996). Unknown 6 i + k is the i-th coefficient of the k-th term.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -98,12 +96,11 @@ def most_likely(
     wanted: Floats,
     weights: Floats,
     rounds: int,
-    same: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Coefficients (n, 6), band of their covariance (6 n, 24) and weights (6,), most likely together.
 
-    wanted (6, n): of the differences of each term; weights: to begin with; same: relative change of the
-    weights at which they stay.
+    wanted (6, n): of the differences of each term; weights: to begin with. There are always as many
+    rounds: stopping early would let rounding decide on the result.
     """
     n = band.shape[0] // TERMS
     most, least = np.zeros(TERMS), np.zeros(TERMS)
@@ -127,13 +124,8 @@ def most_likely(
             continue
         found = solve(factored, pull)
         inverse = inverse_band(factored)
-        change = 0.0
         for k in range(TERMS):
-            new = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k]), most[k])
-            change = max(change, abs(math.log(new / lam[k])))
-            lam[k] = new
-        if change < same:
-            break
+            lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k]), most[k])
     return found.reshape(n, TERMS), inverse, lam
 
 
