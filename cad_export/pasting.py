@@ -201,8 +201,9 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
     factor = scale * millimetres_per(ridge.unit)
     if factor == 1:
         return ridge
-    names = ("arc_length", "spine", "height", "width", "height_std", "width_std", "border")
-    scaled = {name: factor * getattr(ridge, name) for name in names}
+    lengths = ("arc_length", "spine", "height", "width", "border")
+    stds = ("height_std", "width_std", "half_height_width_std", "spine_std")
+    scaled = {name: factor * getattr(ridge, name) for name in lengths + stds}
     return replace(ridge, unit="mm", curvature=ridge.curvature / factor, **scaled)
 
 

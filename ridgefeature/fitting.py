@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 FITS = ("length", "scale", "trim")
 _FEWEST = 13
+_STDS = ("height_std", "width_std", "half_height_width_std", "spine_std")
 
 
 def stretched(ridge: Ridge, length: float, fit: str = "length") -> Ridge:
@@ -34,7 +35,7 @@ def stretched(ridge: Ridge, length: float, fit: str = "length") -> Ridge:
     if fit == "trim":
         return _trimmed(ridge, goal)
     rate = goal / ridge.length
-    sized = ("height", "width", "height_std", "width_std", "border") if fit == "scale" else ()
+    sized = ("height", "width", "border", *_STDS) if fit == "scale" else ()
     changes: dict[str, Any] = {name: rate * getattr(ridge, name) for name in sized}
     return replace(
         ridge,
@@ -59,7 +60,7 @@ def _trimmed(ridge: Ridge, length: float) -> Ridge:
     square = (at["normal"] * at["tangent"]).sum(axis=1, keepdims=True)
     at["normal"] = unit(at["normal"] - at["tangent"] * square)
     # a spline through deviations may overshoot below zero; straight lines do not
-    for name in ("height_std", "width_std"):
+    for name in _STDS:
         std = np.interp(s, ridge.arc_length, getattr(ridge, name))
         at[name] = np.nan_to_num(std, nan=np.inf, posinf=np.inf)  # unknown ones are infinite
     return replace(ridge, arc_length=s, closed=False, **at)

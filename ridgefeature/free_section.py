@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +19,12 @@ SPANS = (14, 28)
 """Spans of the free spline, over WIDER widths."""
 WIDER = 1.25
 FREE = "free"
-_FOOT = 0.012
-"""Height at which a section begins, in apex heights."""
+LEARNED = "learned"
+_LOW, _FOOT_ROOT = (0.05, 0.2), 1 / 2.5
+_FOOT_STD = 0.04
+"""Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
+_TOP = 0.95
+"""The apex is midway between the places of this height."""
 _ROUNDS = 8
 _LEAST_SPANS = 20
 
@@ -65,7 +70,7 @@ def free_section(
     told = np.diagonal(matrix)
     if not (np.isfinite(matrix).all() and (told[-3:] > 0).all() and (told[:-3] > 0).any()):
         return None
-    found, freedom = _smoothest(matrix, right, spans)
+    found, freedom, _ = _smoothest(matrix, right, spans)
     if not found[3:-6].max() > 0:
         return None
     return FreeSection(found, wider, _gain(matrix, right, found, section, spans, wider), freedom)
@@ -73,17 +78,64 @@ def free_section(
 
 def trimmed(section: Section) -> tuple[Section, float, float]:
     """The section between its feet, their middle and their distance in widths of the section as it was."""
-    eta = np.linspace(-0.5, 0.5, 2001)
-    low, high = _feet(section(eta))
-    middle, breadth = 0.5 * float(eta[low] + eta[high]), float(eta[high] - eta[low])
+    low, high = _feet(section)
+    middle, breadth = 0.5 * (low + high), high - low
     own, spans = np.linspace(-0.5, 0.5, 401), max(round(section.spans * breadth), _LEAST_SPANS)
     basis = basis_matrix(np.arange(-3.0, spans + 4.0), 3, (own + 0.5) * spans)[:, 3:-3]
     raised = np.linalg.lstsq(basis, section(middle + breadth * own), rcond=None)[0]
-    return Section(np.asarray(raised, dtype=np.float64), "learned"), middle, breadth
+    return Section(np.asarray(raised, dtype=np.float64), LEARNED), middle, breadth
 
 
-def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float]:
-    """Coefficients of largest restricted likelihood (as in ridgefeature.smoothing), effective number."""
+@dataclass(frozen=True)
+class SectionStd:
+    """Standard deviations that a learned section adds along the whole ridge alike."""
+
+    height: float = 0.0
+    """In heights; the others in widths."""
+    half_height_width: float = 0.0
+    width: float = 0.0
+    apex: float = 0.0
+    """Of its place."""
+
+    def in_parts_of(self, breadth: float) -> SectionStd:
+        """The same for widths that are `breadth` times these."""
+        rest = (x / breadth for x in (self.half_height_width, self.width, self.apex))
+        return SectionStd(self.height, *rest)
+
+
+def section_std(
+    points: Array, terms: Array, section: Section, noise: tuple[float, float, float], inflation: float
+) -> SectionStd:
+    """How sure a learned section is; arguments as for `free_section`. Zeros for one that has a name."""
+    if section.name not in (LEARNED, FREE):
+        return SectionStd()
+    spans = section.spans
+    matrix, right = section_sums(points, terms, section.table, *noise, spans, 1.0)
+    inverse = _smoothest(matrix, right, spans)[2]
+    covariance = inflation * inverse[:-3, :-3]
+    eta = np.linspace(-0.5, 0.5, 2001)
+    f = section(eta)
+    knots, slope = np.arange(-3.0, spans + 4.0), section(eta, 1)
+    top = basis_matrix(knots, 3, (eta[[np.argmax(f)]] + 0.5) * spans)[0]
+
+    def moved(level: float) -> tuple[Array, Array]:
+        """How the lowest and the highest place at a level move with the coefficients."""
+        at = np.flatnonzero(f >= level)[[0, -1]]
+        sides = basis_matrix(knots, 3, (eta[at] + 0.5) * spans)
+        low, high = (level * top - sides) / slope[at, None]
+        return low, high
+
+    def std(of: Array) -> float:
+        return math.sqrt(max(float(of @ covariance @ of), 0.0))
+
+    (low, high), (left, right) = moved(0.5), moved(_TOP)
+    half = std(high - low)
+    return SectionStd(std(top), half, math.hypot(half, _FOOT_STD), std(0.5 * (left + right)))
+
+
+def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, Array]:
+    """Coefficients of largest restricted likelihood (as in ridgefeature.smoothing), effective number and
+    covariance."""
     n = spans + 3
     d = np.zeros((n - 2, len(matrix)))
     d[:, :n] = np.diff(np.eye(n), 2, axis=0)
@@ -95,14 +147,14 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float]:
     lam = 1e-3 * size
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        inverse = np.linalg.inv(matrix + lam * penalty + ridge)
+        inverse = np.asarray(np.linalg.inv(matrix + lam * penalty + ridge), dtype=np.float64)
         found = inverse @ right
         rough = float(((d @ found) ** 2).sum())
         free = max(n - 2 - lam * float((penalty * inverse).sum()), 1e-2)
         # Always as many rounds: stopping early would let rounding decide on the result.
         low, high = max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)
         lam = float(np.clip(free / max(rough, 1e-300), low, high))
-    return found, free
+    return found, free, inverse
 
 
 def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: int, wider: float) -> float:
@@ -122,12 +174,19 @@ def _loss(matrix: Array, right: Array, x: Array) -> float:
     return float(x @ matrix @ x - 2.0 * right @ x)
 
 
-def _feet(f: Array) -> tuple[int, int]:
-    """Between which places of a sampled section it stands out, about its apex."""
-    low = high = int(np.argmax(f))
-    least = _FOOT * f[low]
-    while low > 0 and f[low - 1] > least:
-        low -= 1
-    while high < len(f) - 1 and f[high + 1] > least:
-        high += 1
-    return low, high
+def _feet(section: Section) -> tuple[float, float]:
+    """Between which places a section stands out, about its apex.
+
+    Where it rises to two low heights tells where it begins: a foot is between a parabola, as of a cosine,
+    and a cubic, as of a B-spline.
+    """
+    eta = np.linspace(-0.5, 0.5, 2001)
+    f = section(eta)
+    top = int(np.argmax(f))
+    ends = []
+    for heights in (f[top:], f[top::-1]):
+        sides = [int(np.argmax(heights < level * f[top])) or len(heights) - 1 for level in _LOW]
+        outer, inner = (x**_FOOT_ROOT for x in _LOW)
+        reach = sides[0] + (sides[0] - sides[1]) * outer / (inner - outer)
+        ends.append(reach * float(eta[1] - eta[0]))
+    return max(float(eta[top]) - ends[1], -0.5), min(float(eta[top]) + ends[0], 0.5)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.free_section import FREE, SPANS, WIDER, free_section
+from ridgefeature.free_section import FREE, SPANS, WIDER, SectionStd, free_section, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.kernels.strip import TERMS, A, B, C, E, H, W, information, mixture, offsets
 from ridgefeature.path_frame import PathFrame, points_along
@@ -51,6 +51,11 @@ class Noise:
     even: float
     """0 where points lie evenly over the base, 1 where evenly over the surface."""
 
+    @property
+    def told(self) -> tuple[float, float, float]:
+        """As the kernels take it."""
+        return self.scale, self.density, self.even
+
 
 @dataclass(frozen=True, eq=False)
 class Joint:
@@ -68,12 +73,19 @@ class Joint:
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
+    section_std: SectionStd
 
     def between_feet(self, section: Section, middle: float, breadth: float) -> Joint:
         """The same with a section whose feet lie `breadth` apart about `middle`, in widths of the old one."""
         change = np.eye(TERMS)
         change[E, W], change[W, W] = middle, breadth
-        return replace(self, section=section, terms=self.terms @ change.T, smooth=self.smooth.changed(change))
+        return replace(
+            self,
+            section=section,
+            terms=self.terms @ change.T,
+            smooth=self.smooth.changed(change),
+            section_std=self.section_std.in_parts_of(breadth),
+        )
 
     def without(self, term: int) -> Joint:
         """The same where one term is 0."""
@@ -142,7 +154,8 @@ def fit_whole(
             new, terms = _shaped(some, terms, section, noise, inflation)
             shaping, section = new is not section, new
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
-    return Joint(path, smooth, terms, section, matrix, goal, counts.astype(np.float64), noise, inflation)
+    shape = section_std(some, terms, section, noise.told, inflation)
+    return Joint(path, smooth, terms, section, matrix, goal, counts.astype(float), noise, inflation, shape)
 
 
 def _linearised(
@@ -169,7 +182,7 @@ def _shaped(
     price, best, kept = np.log(len(points)), 0.0, (section, terms)
     wider = 1.0 if section.name == FREE else WIDER
     for spans in SPANS:
-        found = free_section(points, terms, section, (noise.scale, noise.density, noise.even), spans, wider)
+        found = free_section(points, terms, section, noise.told, spans, wider)
         if found is None:
             continue
         cost = price * found.freedom

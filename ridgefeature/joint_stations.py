@@ -134,6 +134,7 @@ def stations_of(
     bend = np.abs((np.gradient(tangent, even, axis=0) * np.cross(normal, tangent)).sum(axis=1))
     curvature, height, width = values.T
     width = np.maximum(width, _NARROWEST * np.median(width))
+    shape, half = joint.section_std, joint.section.half_height_width
     found = Stations(
         arc_length=even,
         spine=curve(t),
@@ -141,8 +142,10 @@ def stations_of(
         normal=normal,
         height=height,
         width=width,
-        height_std=stds[:, 0],
-        width_std=stds[:, 1],
+        height_std=np.hypot(stds[:, 0], np.abs(height) * shape.height),
+        width_std=np.hypot(stds[:, 1], width * shape.width),
+        half_height_width_std=np.hypot(half * stds[:, 1], width * shape.half_height_width),
+        spine_std=np.hypot(stds[:, 2], width * shape.apex),
         border=border_of(width, bend, settings),
         curvature=curvature,
     )
@@ -150,7 +153,8 @@ def stations_of(
 
 
 def _places(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
-    """Spine, normal (k, 3 each); curvature, height, width (k, 3); standard deviations of these two (k, 2).
+    """Spine, normal (k, 3 each); curvature, height, width (k, 3); standard deviations of these two
+    and of the place sideways (k, 3).
 
     s (k,): arc lengths of the path that the ridge was fitted along.
     """
@@ -181,5 +185,5 @@ def _unblended(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
     rise = a + b * e + (0.5 * bend + c) * e * e
     spine = origin + e[:, None] * left + rise[:, None] * normal
     up = unit(normal - tilt[:, None] * left)
-    stds = [joint.smooth.deviations(first, basis, term) for term in (H, W)]
+    stds = [joint.smooth.deviations(first, basis, term) for term in (H, W, E)]
     return spine, up, np.column_stack([bend + 2.0 * c, h, w]), np.column_stack(stds)

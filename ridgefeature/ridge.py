@@ -141,13 +141,10 @@ class Ridge(Stations):
                 f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet "
                 f"stay on the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
             )
-        ridge = replace(
-            self,
-            height=new_height,
-            width=new_width,
-            height_std=_times(self.height_std, np.abs(height_rate)),
-            width_std=_times(self.width_std, width_rate),
-        )
+        rates = {"height_std": np.abs(height_rate), "width_std": width_rate}
+        rates["half_height_width_std"] = width_rate
+        stds: dict[str, Any] = {name: _times(getattr(self, name), rate) for name, rate in rates.items()}
+        ridge = replace(self, height=new_height, width=new_width, **stds)
         ridge.__dict__["_base"] = self._base
         return ridge
 

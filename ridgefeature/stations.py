@@ -43,10 +43,15 @@ class Stations:
     """(k,) distance of the flanks' outer borders from the spine; a change of h or w does not move them."""
     curvature: Array = field(default_factory=lambda: np.empty(0), kw_only=True)
     """(k,) of the base across the path, positive where it rises to both sides; zeros if not given."""
+    half_height_width_std: Array = field(default_factory=lambda: np.empty(0), kw_only=True)
+    """(k,) of the full width at half height, which is often known better than that between the feet."""
+    spine_std: Array = field(default_factory=lambda: np.empty(0), kw_only=True)
+    """(k,) of the spine's place sideways. Both are infinite if not given."""
 
     def __post_init__(self) -> None:
-        if not self.curvature.size:
-            object.__setattr__(self, "curvature", np.zeros(len(self.arc_length)))
+        for name, value in (("curvature", 0.0), ("half_height_width_std", np.inf), ("spine_std", np.inf)):
+            if not getattr(self, name).size:
+                object.__setattr__(self, name, np.full(len(self.arc_length), value))
 
 
 def interpolating_curve(sites: Array, points: Array) -> Curve:
@@ -206,19 +211,21 @@ def _sizes(
 
     spread (k, n): from values at the templates; curvature (k,): of the path.
     """
-    std = np.array([(q.std[6], q.std[7]) if q.std is not None else (np.inf, np.inf) for q in templates])
+    std = np.array([q.std[[6, 7, 1]] if q.std is not None else np.full(3, np.inf) for q in templates])
     widths = np.array([q.width for q in templates])
     width = np.maximum(spread @ widths, 0.25 * widths.min())
     heights = np.array([q.height for q in templates])
     # Beyond the last centres both go on straight, but neither vanishes nor changes its sign.
     sign = 1.0 if np.median(heights) > 0 else -1.0
     height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
-    height_std, width_std = np.sqrt(spread**2 @ std**2).T
+    height_std, width_std, spine_std = np.sqrt(spread**2 @ std**2).T
     return {
         "height": height,
         "width": width,
         "height_std": height_std,
         "width_std": width_std,
+        "half_height_width_std": templates[0].section.half_height_width * width_std,
+        "spine_std": spine_std,
         "border": border_of(width, curvature, settings),
     }
 
