@@ -259,8 +259,8 @@ def test_the_module_runs_as_a_program(scan_file: Path, tmp_path: Path) -> None:
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1 and "--at" in done.stderr
-    shown = subprocess.run([*words[:3], "--help"], capture_output=True, text=True, cwd=tmp_path)
-    assert shown.returncode == 0
+    shown = run("--help")
+    assert shown.exit_code == 0
     assert all(name in shown.stdout for name in ("demo", "register", "export", "info"))
 
 

@@ -81,7 +81,7 @@ def test_other_faces_are_the_hosts_own_and_the_host_is_not_altered() -> None:
     edges = [e.wrapped for e in host.Edges()]
     before = [BRep_Tool.Tolerance_s(e) for e in edges], volume(host.wrapped), len(host.Faces())
     face = curved_face(host)
-    solid = solid_of(host, face, carried(2.0, cylinder_map(20.0)))
+    solid = solid_of(host, face, carried(2.0, cylinder_map(20.0)), check=False)
     assert before == ([BRep_Tool.Tolerance_s(e) for e in edges], volume(host.wrapped), len(host.Faces()))
     kept = [f for f in solid.Faces() if any(f.wrapped.IsSame(g.wrapped) for g in host.Faces())]
     assert len(kept) == len(host.Faces()) - 1 and not any(f.wrapped.IsSame(face) for f in solid.Faces())
@@ -96,7 +96,7 @@ def test_a_ring_keeps_what_it_encloses() -> None:
     assert volume(solid, 1e-7) - volume(host.wrapped) == pytest.approx(report.volume_expected, rel=1e-3)
     made = cq.Solid(solid)
     assert len(made.Faces()) == len(host.Faces()) + 2  # the ring and the island with the hole in it
-    groove = inset(host.wrapped, top(host), ring_ridge(-1.5, 5.0), pair[1])[1]
+    groove = inset(host.wrapped, top(host), ring_ridge(-1.5, 5.0), pair[1], check=False)[1]
     assert groove.volume_added == pytest.approx(-report.volume_expected, rel=1e-3)
 
 
@@ -108,7 +108,7 @@ def test_several_ridges_one_after_another_on_one_face() -> None:
     expected = volume(solid.wrapped)
     for pair in pairs:
         face = next(f for f in solid.Faces() if f.geomType() == "PLANE" and f.Center().z > 4.9).wrapped
-        made, report = inset(solid.wrapped, face, *pair)
+        made, report = inset(solid.wrapped, face, *pair, check=pair is pairs[-1])
         solid, expected = cq.Solid(made), expected + report.volume_expected
     assert volume(solid.wrapped, 1e-7) == pytest.approx(expected, abs=1e-3)
     for pair in pairs:
