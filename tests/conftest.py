@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 import pytest
@@ -9,6 +10,8 @@ import pytest
 
 @pytest.fixture(scope="session", autouse=True)
 def _compiled() -> None:
+    # What is imported stays for good: not to be looked through again whenever garbage is collected.
+    gc.freeze()
     if os.environ.get("PYTEST_XDIST_WORKER") == "gw1":
         from warm_kernels import compile_late_kernels
 

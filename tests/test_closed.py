@@ -94,7 +94,7 @@ def ring(scene) -> rf.Ridge:
 
 
 @pytest.mark.parametrize("name", RINGS)
-@pytest.mark.parametrize("seed", range(13))
+@pytest.mark.parametrize("seed", range(6))  # every noise without and with strays
 def test_a_ring_is_closed_and_as_long_as_its_path(name, seed):
     found = registered(RINGS[name], NOISE[seed % 3], seed)
     assert found.closed and found.stop == ("closed", "closed")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from example_runner import FOLDER, run_example
+from example_runner import FOLDER, run_example, run_example_afresh
 
 SCRIPTS = sorted(path.name for path in FOLDER.glob("*.py") if "__main__" in path.read_text())
 # Those that make a part run where others open its file.
@@ -18,9 +18,14 @@ def test_the_examples_are_there() -> None:
     assert asked <= set(SCRIPTS)
 
 
-@pytest.mark.parametrize("name", HERE)
+@pytest.mark.parametrize("name", sorted({*HERE} - {"clay.py"}))
 def test_example(name: str, tmp_path: Path) -> None:
     run_example(name, tmp_path)
+
+
+def test_an_example_runs_in_a_process_of_its_own(tmp_path: Path) -> None:
+    """One that imports from the file beside it."""
+    run_example_afresh("clay.py", tmp_path)
 
 
 def test_the_panel_is_a_script_with_parameters() -> None:

@@ -16,7 +16,7 @@ from cad_export.check import volume
 
 @pytest.fixture(scope="module")
 def ridge() -> rf.Ridge:
-    return spiral_ridge()
+    return spiral_ridge().stretched(40.0, "trim")
 
 
 @needs_freecad

@@ -178,9 +178,8 @@ def test_a_ridge_may_run_on_over_faces_that_go_on_from_the_face(ridge):
     face = cq.Workplane(host).faces(">Z").vals()[0]
     short, report = ridge.stretched(60.0, "scale"), {}
     part = cx.paste(short, host, face=face, at=(-10, 0, 10), direction=(1, 0, 0), report=report)
-    whole = cx.paste(
-        short, cq.Solid.makeBox(120, 80, 20, (-60, -40, -10)), at=(-10, 0, 10), direction=(1, 0, 0)
-    )
+    one = cq.Solid.makeBox(120, 80, 20, (-60, -40, -10))
+    whole = cx.paste(short, one, at=(-10, 0, 10), direction=(1, 0, 0), check=False)
     assert report["method"] == "split seam"
     assert part.Volume(1e-6) == pytest.approx(whole.Volume(1e-6), rel=1e-6)
     [(grown, _)], [(same, _)] = cx.carried_by(part), cx.carried_by(whole)

@@ -20,8 +20,8 @@ from cad_export import pasting
 from cad_export.check import volume
 from cad_export.occt_arrays import pole_array
 
-HEIGHTS = np.linspace(-2.0, 3.0, 50)
-MEASURED = slice(0, 50, 7)
+HEIGHTS = np.linspace(-2.0, 3.0, 22)
+MEASURED = slice(0, 22, 4)
 """The pastes whose whole solid is measured, too."""
 
 
@@ -61,12 +61,12 @@ HOSTS = {"plane": plane, "cylinder": cylinder, "sphere": sphere, "spline": splin
 
 @pytest.fixture(scope="module")
 def ridge() -> rf.Ridge:
-    return spiral_ridge().stretched(30.0, "trim")
+    return spiral_ridge().stretched(20.0, "trim")
 
 
 @dataclass(frozen=True)
 class Heights:
-    """Volumes (50,) by the integral, and by OCCT over the faces that changed; (8,) of whole solids."""
+    """Volumes (22,) by the integral, and by OCCT over the faces that changed; (6,) of whole solids."""
 
     name: str
     expected: np.ndarray
@@ -116,7 +116,8 @@ def test_another_width_is_the_same_on_a_warm_place_and_a_cold_one(name: str, rid
     warm = [cx.paste(ridge, host.solid, w=w, **place) for w in widths]
     stand = next(reversed(pasting._STANDS.values()))
     assert len(stand.sites) == pasting._KEPT_WIDTHS < len(widths)
-    for w, part in zip(widths, warm, strict=True):
+    # the first was pasted on a cold place; of the others one at first, one when places were forgotten
+    for w, part in ((widths[1], warm[1]), (widths[-1], warm[-1])):
         pasting._STANDS.clear()
         cold = cx.paste(ridge, host.solid, w=w, **place)
         one, other = (pole_array(BRep_Tool.Surface_s(cx.carried_by(p)[0][0])) for p in (part, cold))

@@ -14,7 +14,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 @given(SEEDS, st.sampled_from([0.0, 1e5]), st.floats(-1.0, 1.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_project_recovers_points_offset_along_normals(seed: int, origin: float, reach: float) -> None:
     surface, rng = bell(origin=origin), np.random.default_rng(seed)
     u, v = inner(rng, surface, 200)

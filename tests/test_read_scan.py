@@ -203,18 +203,14 @@ def test_unknown_unit_is_refused(tmp_path):
 HEAVY = ["trimesh", "OCP", "cadquery", "matplotlib", "laspy", "lazrs", "pye57", "pypcd4", "cad_export"]
 
 
-def loaded_after(code):
-    code += f"\nimport sys; print(*[m for m in {HEAVY} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return done.stdout.split()
-
-
-def test_importing_io_loads_no_format_library():
-    assert loaded_after("import ridgefeature.io, ridgefeature.scan") == []
-
-
-def test_reading_a_table_loads_no_format_library(tmp_path):
+def test_importing_and_reading_a_table_load_no_format_library(tmp_path):
     write(tmp_path / "a.csv", rows(POINTS, ","))
-    assert (
-        loaded_after(f"from ridgefeature.io import read_scan; read_scan({str(tmp_path / 'a.csv')!r})") == []
-    )
+    code = f"""
+import sys
+import ridgefeature.io, ridgefeature.scan
+print([m for m in {HEAVY} if m in sys.modules])
+ridgefeature.io.read_scan({str(tmp_path / "a.csv")!r})
+print([m for m in {HEAVY} if m in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["[]", "[]"]

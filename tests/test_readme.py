@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from ridgefeature import cli
 from ridgefeature.io.read import FORMATS
@@ -29,27 +30,33 @@ SET_UP = [block.strip() for block in blocks("sh") if ".venv" in block]
 COMMANDS = [line for block in blocks("sh") if ".venv" not in block for line in block.splitlines()]
 
 
-def command(line: str, folder: Path) -> str:
-    """What a command line of ridgefeature prints."""
+def arguments(line: str) -> list[str]:
+    """Of a command line of ridgefeature."""
     name, *words = shlex.split(line)
     assert name == "ridgefeature", line
+    return words
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder in which the demo has run, in a process of its own, and what it printed."""
+    folder = tmp_path_factory.mktemp("readme")
     done = subprocess.run(
-        [sys.executable, "-m", "ridgefeature", *words],
+        [sys.executable, "-m", "ridgefeature", *arguments(SET_UP[0].split(".venv/bin/")[-1])],
         cwd=folder,
         capture_output=True,
         text=True,
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return folder, done.stdout
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder in which the demo has run."""
-    folder = tmp_path_factory.mktemp("readme")
-    assert "Against the truth" in command(SET_UP[0].split(".venv/bin/")[-1], folder)
-    return folder
+@pytest.fixture
+def demo(shown: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder in which the demo has run; it is the working directory."""
+    monkeypatch.chdir(shown[0])
+    return shown[0]
 
 
 def test_two_commands_do_all_the_set_up() -> None:
@@ -68,8 +75,18 @@ def test_ci_runs_the_test_command_word_for_word() -> None:
     assert script.rstrip().endswith('"$test_command"')
 
 
-def test_the_python_blocks_run(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(demo)
+def test_the_demo_ends_by_naming_files_that_are_there(shown: tuple[Path, str]) -> None:
+    folder = shown[0] / "ridge-demo"
+    names = {"spiral.npy", "feature.ridge.json", "ridge.step", "ridge_h1.5.step", "profile.png", "view.png"}
+    assert {p.name for p in folder.iterdir()} == names
+    truth, _, after = shown[1].partition("Against the truth")[2].partition("Open next")
+    errors = [float(line.split()[1]) for line in truth.splitlines() if line.startswith(("height", "width"))]
+    assert len(errors) == 2 and max(errors) < 5
+    named = [Path(line.split("  ")[0]) for line in after.splitlines() if line.startswith("ridge-demo")]
+    assert len(named) == 4 and all((shown[0] / path).is_file() for path in named)
+
+
+def test_the_python_blocks_run(demo: Path) -> None:
     names: dict[str, object] = {}
     assert len(blocks("python")) >= 3
     for block in blocks("python"):
@@ -81,7 +98,9 @@ def test_the_python_blocks_run(demo: Path, monkeypatch: pytest.MonkeyPatch) -> N
 def test_the_command_lines_run(demo: Path) -> None:
     assert len(COMMANDS) >= 3
     for line in COMMANDS:
-        assert command(line, demo).strip(), line
+        result = CliRunner().invoke(cli.main, arguments(line))
+        assert result.exit_code == 0, result.stderr
+        assert result.stdout.strip(), line
     assert {p.name for p in (demo / "ridge-out").iterdir()} == {
         "feature.ridge.json",
         "profile.png",

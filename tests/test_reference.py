@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
@@ -399,18 +400,18 @@ def test_surfaces_without_a_ridge_are_the_same_for_the_same_seed(surface: str) -
     assert (points == click).all(axis=1).any()
 
 
-def test_the_campaign_prints_its_figures_and_writes_its_table(tmp_path: Path) -> None:
-    command = [sys.executable, str(RUN), "--cases", "2", "--jobs", "1"]
-    done = subprocess.run(
-        [*command, "--only", "path=straight", "--table", str(tmp_path / "t.csv")],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "2 random ridges: found whole, right and no more [%]" in done.stdout
-    assert "| path = straight | 2 |" in done.stdout
+def test_the_campaign_prints_its_figures_and_writes_its_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [str(RUN), "--cases", "2", "--jobs", "1", "--only"]
+    monkeypatch.setattr(sys, "argv", [*words, "path=straight", "--table", str(tmp_path / "t.csv")])
+    monkeypatch.syspath_prepend(RUN.parent)
+    runpy.run_path(str(RUN), run_name="__main__")
+    printed = capsys.readouterr().out
+    assert "2 random ridges: found whole, right and no more [%]" in printed
+    assert "| path = straight | 2 |" in printed
     with (tmp_path / "t.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [row["seed"] for row in rows] == ["0", "1"] and {row["path"] for row in rows} == {"straight"}
-    wrong = subprocess.run([*command, "--only", "nonsense"], capture_output=True, text=True)
+    wrong = subprocess.run([sys.executable, *words, "nonsense"], capture_output=True, text=True)
     assert wrong.returncode == 2 and "expected campaign, flat, clicks, rings or KIND=VALUE" in wrong.stderr

@@ -16,7 +16,7 @@ from cad_export.occt_arrays import pole_array
 
 @pytest.fixture(scope="module")
 def ridge() -> rf.Ridge:
-    return spiral_ridge().stretched(40.0, "trim")
+    return spiral_ridge().stretched(20.0, "trim")
 
 
 @pytest.fixture(scope="module")

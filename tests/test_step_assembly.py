@@ -24,7 +24,7 @@ TOP = cq.Location((0, 0, 3))
 
 @pytest.fixture(scope="module")
 def ridge() -> rf.Ridge:
-    return spiral_ridge().stretched(40.0, "trim")
+    return spiral_ridge().stretched(20.0, "trim")
 
 
 @pytest.fixture(scope="module")

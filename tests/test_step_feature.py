@@ -342,22 +342,25 @@ def test_files_without_a_feature(tmp_path: Path) -> None:
 # Other programs, and time
 
 
-def test_loading_needs_no_occt(text: str, tmp_path: Path) -> None:
+def test_loading_needs_no_occt_and_writing_no_cadquery(ridge: rf.Ridge, text: str, tmp_path: Path) -> None:
     (tmp_path / "a.step").write_text(text)
-    code = "import sys, cad_export as cx; cx.load(sys.argv[1]); print('OCP' in sys.modules)"
-    words = [sys.executable, "-c", code, str(tmp_path / "a.step")]
-    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.split() == ["False"]
-
-
-def test_writing_needs_no_cadquery(ridge: rf.Ridge, tmp_path: Path) -> None:
     ridge.save(tmp_path / "a.ridge.json")
-    code = (
-        "import sys, cad_export as cx, ridgefeature as rf; cx.step(rf.load(sys.argv[1]), sys.argv[2])\n"
-        "print('cadquery' in sys.modules)"
-    )
-    words = [sys.executable, "-c", code, str(tmp_path / "a.ridge.json"), str(tmp_path / "a.step")]
-    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.split() == ["False"]
-    same(cx.load(tmp_path / "a.step"), ridge)
+    code = """
+import sys
+import cad_export as cx, ridgefeature as rf
+assert set(cx.__all__) <= set(dir(cx))
+def loaded():
+    return [name for name in ("OCP", "cadquery") if name in sys.modules]
+print(loaded())
+cx.load(sys.argv[1])
+print(loaded())
+cx.step(rf.load(sys.argv[2]), sys.argv[3])
+print(loaded())
+"""
+    words = [sys.executable, "-c", code, *(str(tmp_path / n) for n in ("a.step", "a.ridge.json", "b.step"))]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["[]", "[]", "['OCP']"]
+    same(cx.load(tmp_path / "b.step"), ridge)
 
 
 @pytest.mark.skipif(shutil.which("gmsh") is None, reason="gmsh is not installed")
