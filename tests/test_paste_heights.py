@@ -20,8 +20,8 @@ from cad_export import pasting
 from cad_export.check import volume
 from cad_export.occt_arrays import pole_array
 
-HEIGHTS = np.linspace(-2.0, 3.0, 22)
-MEASURED = slice(0, 22, 4)
+HEIGHTS = np.linspace(-2.0, 3.0, 50)
+MEASURED = slice(0, 50, 7)
 """The pastes whose whole solid is measured, too."""
 
 
@@ -66,7 +66,7 @@ def ridge() -> rf.Ridge:
 
 @dataclass(frozen=True)
 class Heights:
-    """Volumes (22,) by the integral, and by OCCT over the faces that changed; (6,) of whole solids."""
+    """Volumes (50,) by the integral, and by OCCT over the faces that changed; (8,) of whole solids."""
 
     name: str
     expected: np.ndarray
