@@ -46,7 +46,7 @@ from ridgefeature.stations import Stations
 from ridgefeature.synthetic import Spiral
 
 UNNAMED = "unnamed: "
-_HOOK = 4  # stations
+_HOOK = 3000.0  # m
 HEIGHTS, WIDTHS = (-1.0, 0.25, 1.0, 3.0), (0.5, 1.0, 1.5)
 
 
@@ -144,8 +144,8 @@ def mountain() -> rf.Ridge:
     points = np.column_stack([74.5 * column.ravel(), 92.5 * (len(z) - 1 - row).ravel(), z.ravel()])
     found = rf.register(points, at=(17429, 19603, 518))
     # at its start it hooks, tighter than it is wide: no place for another width
-    names = [f.name for f in fields(Stations)]
-    rest: dict[str, Any] = {name: getattr(found, name)[_HOOK:] for name in names}
+    names, own = [f.name for f in fields(Stations)], found.arc_length >= _HOOK
+    rest: dict[str, Any] = {name: getattr(found, name)[own] for name in names}
     rest["arc_length"] = rest["arc_length"] - rest["arc_length"][0]
     return replace(found, **rest).stretched(5000.0, "trim").stretched(100.0, "scale")
 

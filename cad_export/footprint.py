@@ -37,6 +37,7 @@ from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interp
 
 Floats = NDArray[np.float64]
 
+_PARALLEL = 1e-12  # sine of the angle between pieces of one straight line, by rounding
 _SPLIT = 2  # knot spans of a parameter curve for each one of its edge
 _KEPT_CURVES, _KEPT_HOSTS = 64, 8
 _HOSTS: OrderedDict[tuple[int, int], tuple[HostSurface, object]] = OrderedDict()
@@ -260,7 +261,9 @@ def meetings(a: Floats, b: Floats) -> NDArray[np.bool_]:
     q, s = b[None, :, 0], (b[:, 1] - b[:, 0])[None]
     d = q - p
     det = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    safe = np.where(det == 0, np.nan, det)
+    # Pieces of one straight line are parallel but for rounding.
+    parallel = np.abs(det) <= _PARALLEL * np.linalg.norm(r, axis=-1) * np.linalg.norm(s, axis=-1)
+    safe = np.where(parallel, np.nan, det)
     t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / safe
     u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / safe
     with np.errstate(invalid="ignore"):

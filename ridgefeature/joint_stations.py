@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 _BENT = 4.5
 """Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
-_NARROWEST = 0.2
+_NARROWEST, _LOWEST = 0.2, 0.02
+"""Least width and height, in those that are usual: neither vanishes nor changes its sign."""
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _SHORTEST = 1.5
@@ -134,6 +135,8 @@ def stations_of(
     bend = np.abs((np.gradient(tangent, even, axis=0) * np.cross(normal, tangent)).sum(axis=1))
     curvature, height, width = values.T
     width = np.maximum(width, _NARROWEST * np.median(width))
+    usual = float(np.median(height))
+    height = np.copysign(np.maximum(height * np.sign(usual), _LOWEST * abs(usual)), usual)
     shape, half = joint.section_std, joint.section.half_height_width
     found = Stations(
         arc_length=even,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.joint import Joint
-from ridgefeature.kernels.strip import A, B, C, H
+from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.path_frame import NODES_A_WIDTH
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ VISIBLE = 25.0
 """Evidence of a stretch of one width from which on a ridge is seen."""
 _OUTER = 3.0
 """Evidence of its outer half: the inner one may lie on an end that is known a little too early."""
-_DENSE = 0.35
+_DENSE = 0.5
 """Points a stretch, in parts of what is usual, below which the data end."""
 _NEAR = 0.3
 """Length in widths of the stretch whose points are counted."""
@@ -30,24 +30,36 @@ _RISES = 1.3
 """Height further out, in parts of that at the end, above which it is something else."""
 _SEEN = 0.6
 """Part of the last window in which a ridge is seen that still belongs to it."""
-_BASE_AND_HEIGHT = [A, B, C, H]
+_BEFORE = (1.5, 0.4)
+"""Stretch before an end, in widths, whose heights tell how high the ridge would be further on."""
+_LIKELY = 6.0
+"""Twice the log likelihood ratio up to which a place may be the end: of a change point, at 95 %."""
+_ANYTHING = 3.84
+_FADED = 0.5
+"""Height at an end, in usual heights, below which the ridge fades there."""
+_FADING, _SLACK = 0.25, 0.2
+"""Widths by which the end of a fading ridge may have come earlier; by which any end is uncertain."""
+_BASE_AND_HEIGHT = [A, B, H]
 
 
 def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
     """Twice the log likelihood ratio of ridge against none, and the height, of so many stretches in a row.
 
-    (n - stretches + 1,) each, of all such windows. Base and height are free there, the path and the width as
-    the whole ridge has them.
+    (n - stretches + 1,) each, of all such windows. Offset and tilt of the base and the height are free there,
+    all else is as the whole ridge has it.
     """
+    terms = 0.5 * (joint.terms[1:] + joint.terms[:-1])
+    known = [C, E, W]
+    goal = joint.goal - np.einsum("nij,nj->ni", joint.matrix[:, :, known], terms[:, known])
     m = joint.matrix[:, _BASE_AND_HEIGHT][:, :, _BASE_AND_HEIGHT]
-    m, goal = _windows(m, stretches), _windows(joint.goal[:, _BASE_AND_HEIGHT], stretches)
-    sizes = np.sqrt(np.maximum(np.einsum("nii->ni", m[:, :3, :3]), 1e-300))
-    scaled = m[:, :3, :3] / (sizes[:, :, None] * sizes[:, None]) + 1e-9 * np.eye(3)
-    cross = m[:, :3, 3] / sizes
-    solved = np.linalg.solve(scaled, np.stack([cross, goal[:, :3] / sizes], axis=2))
-    left = m[:, 3, 3] - (cross * solved[:, :, 0]).sum(axis=1)
-    pull = goal[:, 3] - (cross * solved[:, :, 1]).sum(axis=1)
-    told = left > 1e-6 * m[:, 3, 3]
+    m, goal = _windows(m, stretches), _windows(goal[:, _BASE_AND_HEIGHT], stretches)
+    sizes = np.sqrt(np.maximum(np.einsum("nii->ni", m[:, :2, :2]), 1e-300))
+    scaled = m[:, :2, :2] / (sizes[:, :, None] * sizes[:, None]) + 1e-9 * np.eye(2)
+    cross = m[:, :2, 2] / sizes
+    solved = np.linalg.solve(scaled, np.stack([cross, goal[:, :2] / sizes], axis=2))
+    left = m[:, 2, 2] - (cross * solved[:, :, 0]).sum(axis=1)
+    pull = goal[:, 2] - (cross * solved[:, :, 1]).sum(axis=1)
+    told = left > 1e-6 * m[:, 2, 2]
     height = np.where(told, pull / np.where(told, left, 1.0), 0.0)
     return np.where(told, height * pull, 0.0), height
 
@@ -100,3 +112,43 @@ def _end(seen: Flags, height: Array, dense: Flags, known: Array, i: int, one: in
     while i > near and not dense[i - near]:
         i -= 1
     return i
+
+
+def end_interval(joint: Joint, place: float, outwards: int) -> tuple[float, float]:
+    """Arc lengths between which an end at `place` is, to about 95 %.
+
+    outwards: 1 for the end at the path's end, -1 for that at its start. The end is where the height as it is
+    before it stops being more likely than none. A ridge that has nearly faded may go on as long as the points
+    of one width show anything.
+    """
+    path = joint.path
+    at, end = outwards * path.at[::outwards], outwards * place
+    matrix, goal = joint.matrix[::outwards], joint.goal[::outwards]
+    terms = joint.terms[::outwards]
+    terms = 0.5 * (terms[1:] + terms[:-1])
+    middle = 0.5 * (at[1:] + at[:-1])
+    local = float(path.width[::outwards][np.argmin(np.abs(at - end))])
+    from_end = (middle - end) / local
+    before = (from_end > -_BEFORE[0]) & (from_end < -_BEFORE[1])
+    near = np.flatnonzero((from_end > -_BEFORE[0]) & (from_end < BEYOND))
+    slack = _SLACK * local
+    low, high = end - slack, end + slack
+    if before.sum() >= 3:
+        slope, level = np.polyfit(from_end[before], terms[before, H], 1)
+        sign = 1.0 if np.median(terms[before, H]) > 0 else -1.0
+        height = sign * np.maximum(sign * (level + slope * from_end), 0.0)
+        rest = [A, B, C, E, W]
+        pull = goal[:, H] - (matrix[:, H, rest] * terms[:, rest]).sum(axis=1)
+        gain = height * (2.0 * pull - height * matrix[:, H, H])
+        total = np.concatenate([[0.0], np.cumsum(gain[near])])
+        likely = at[near[0] : near[-1] + 2][total > total.max() - _LIKELY]
+        low, high = min(likely[0], end) - slack, max(likely[-1], end) + slack
+        usual = float(np.median(np.abs(joint.terms[:, H])))
+        if abs(level) < _FADED * usual:
+            one = min(NODES_A_WIDTH, len(path.at) - 2)
+            shown = evidence(joint, one)[0][::outwards]
+            k = max(int(np.searchsorted(at, end)) - one // 2, 0)
+            while k < len(shown) - 1 and shown[k] > _ANYTHING:
+                k += 1
+            low, high = low - _FADING * local, max(high, float(at[k + one // 2]) + slack)
+    return (low, high) if outwards > 0 else (-high, -low)
