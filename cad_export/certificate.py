@@ -100,8 +100,7 @@ class Change:
     @property
     def volume_error(self) -> float:
         """By how much the volume added may differ: VOLUME, and OCCT's own precision over the footprint."""
-        extent = float(np.ptp(self.base.poles, axis=(0, 1)).max())
-        return VOLUME * abs(self.volume_expected) + 1e-6 * self.breadth**2 * extent
+        return VOLUME * abs(self.volume_expected) + 1e-6 * self.breadth**2 * self.base.size
 
     @cached_property
     def breadth(self) -> float:

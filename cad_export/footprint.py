@@ -25,15 +25,15 @@ from OCP.GeomAbs import (
     GeomAbs_Torus,
 )
 from OCP.GeomAdaptor import GeomAdaptor_Surface
-from OCP.GeomAPI import GeomAPI
-from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
+from OCP.gp import gp_Ax3, gp_Pln, gp_Pnt
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 
+from cad_export import occt_arrays
 from cad_export.check import subshapes
-from cad_export.geometry import to_occt
-from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interpolate
+from ridgefeature.basis import Places, solved
+from ridgefeature.bspline import Curve, basis_matrix, clamped_knots, greville
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,6 @@ _SPLIT = 2  # knot spans of a parameter curve for each one of its edge
 _KEPT_CURVES, _KEPT_HOSTS = 64, 8
 _HOSTS: OrderedDict[tuple[int, int], tuple[HostSurface, object]] = OrderedDict()
 """Host surfaces asked for lately, with the faces' own shapes, held so that their identity stays theirs."""
-_ACROSS = np.array([0.0, 0.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -158,20 +157,44 @@ def on_host(
 def _on_host(
     host: HostSurface, curve: Curve, span: tuple[float, float], start: Floats | None, forward: bool
 ) -> OnHost:
-    knots = _refined(curve.knots, curve.degree, span, _SPLIT)
-    sites = greville(knots, curve.degree)
-    uv = host.parameters(curve(sites))
+    to = _flattening(curve.knots.tobytes(), curve.degree, span)
+    uv = host.parameters(to.curve_at_sites(curve.poles))
     shift = np.zeros(2) if start is None else start - uv[0 if forward else -1]
     for k, period in enumerate(host.periods):
         if period:
             uv[:, k] += period * np.round(shift[k] / period)
-    poles = interpolate(knots, curve.degree, uv)
-    flat = Curve(poles, knots, curve.degree)
-    at = _refined(curve.knots, curve.degree, span, 4 * _SPLIT)[curve.degree : -curve.degree]
-    fine = flat(at)
-    off = np.linalg.norm(host.points(fine) - curve(at), axis=1)
+    flat = Curve(solved(to.sites, uv), to.knots, curve.degree)
+    fine = to.flat_fine(flat.poles)
+    off = np.linalg.norm(host.points(fine) - to.curve_fine(curve.poles), axis=1)
     line = fine[::2]
     return OnHost(flat, line if forward else line[::-1], float(off.max()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Flattening:
+    """What the parameter curves of all curves with the same knots have in common.
+
+    knots: theirs. sites: their basis functions (n, n) at the sites where they are interpolated. fine: places
+    between, for the distance.
+    """
+
+    knots: Floats
+    sites: Floats
+    curve_at_sites: Places
+    flat_fine: Places
+    curve_fine: Places
+
+
+@lru_cache(4)  # the ends of a ridge have the same knots at all its widths
+def _flattening(knots: bytes, degree: int, span: tuple[float, float]) -> _Flattening:
+    own = np.frombuffer(knots)
+    flat = _refined(own, degree, span, _SPLIT)
+    sites = greville(flat, degree)
+    fine = _refined(own, degree, span, 4 * _SPLIT)[degree:-degree]
+    at_sites, at_fine = (Places.at(own, degree, t) for t in (sites, fine))
+    return _Flattening(
+        flat, basis_matrix(flat, degree, sites), at_sites, Places.at(flat, degree, fine), at_fine
+    )
 
 
 def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:
@@ -191,12 +214,9 @@ def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
 
 @lru_cache(_KEPT_CURVES)
 def _curve2d(poles: bytes, knots: bytes, degree: int) -> Geom2d_BSplineCurve:
-    points = np.frombuffer(poles).reshape(-1, 1, 2)
-    flat = np.zeros((len(points), 2, 3))
-    flat[:, :, :2] = points
-    flat[:, 1, 2] = 1.0  # an iso-curve of a strip: curves need no array containers of their own
-    strip = to_occt(Surface(flat, np.frombuffer(knots), _ACROSS, degree, 1))
-    return GeomAPI.To2d_s(strip.VIso(0.0), gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)))
+    breaks, counts = np.unique(np.frombuffer(knots), return_counts=True)
+    points = occt_arrays.points1_2d(np.frombuffer(poles).reshape(-1, 2))
+    return Geom2d_BSplineCurve(points, occt_arrays.reals(breaks), occt_arrays.integers(counts), degree)
 
 
 def wires_of(face: TopoDS_Face) -> list[TopoDS_Wire]:

@@ -21,6 +21,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from cad_export.face_base import FaceBase
 from cad_export.geometry import DEGENERATE
+from cad_export.host_surface import dot
 from cad_export.strip import places_along
 from ridgefeature.ridge import Ridge
 
@@ -132,8 +133,8 @@ def _curvatures(base: FaceBase, x: Floats) -> tuple[Floats, Floats]:
     """Principal curvatures (...) at parameters (..., 2), the lesser first; positive where normals meet."""
     _, pu, pv, puu, puv, pvv = base.host.jet(x[..., 0], x[..., 1])
     normal = base.host.normal(pu, pv)
-    e, f, g = ((a * b).sum(axis=-1) for a, b in ((pu, pu), (pu, pv), (pv, pv)))
-    ll, m, n = ((a * normal).sum(axis=-1) for a in (puu, puv, pvv))
+    e, f, g = dot(pu, pu), dot(pu, pv), dot(pv, pv)
+    ll, m, n = dot(puu, normal), dot(puv, normal), dot(pvv, normal)
     area = e * g - f * f
     mean = 0.5 * (e * n - 2 * f * m + g * ll) / area
     spread = np.sqrt(np.maximum(mean**2 - (ll * n - m * m) / area, 0.0))

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineSurface
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.StepRepr import StepRepr_HArray1OfRepresentationItem, StepRepr_RepresentationItem
-from OCP.TColgp import TColgp_Array2OfPnt
+from OCP.TColgp import TColgp_Array1OfPnt2d, TColgp_Array2OfPnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
 from OCP.TDF import TDF_LabelSequence
 from OCP.TopTools import TopTools_IndexedMapOfShape
@@ -24,6 +24,14 @@ def points2(poles: Floats) -> TColgp_Array2OfPnt:
     for i, row in enumerate(poles.tolist(), 1):
         for j, (x, y, z) in enumerate(row, 1):
             array.SetValue(i, j, gp_Pnt(x, y, z))
+    return array
+
+
+def points1_2d(poles: Floats) -> TColgp_Array1OfPnt2d:
+    """poles (n, 2) as an OCCT array of points of a plane, indices from 1."""
+    array = TColgp_Array1OfPnt2d(1, len(poles))
+    for i, (x, y) in enumerate(poles.tolist(), 1):
+        array.SetValue(i, gp_Pnt2d(x, y))
     return array
 
 

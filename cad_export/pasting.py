@@ -28,6 +28,7 @@ from cad_export.paste_history import Placement, remember
 from cad_export.site import Site
 from cad_export.strip import OffFaceError
 from ridgefeature.fitting import FITS
+from ridgefeature.on_base import surfaces_on
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import millimetres_per
 
@@ -102,7 +103,8 @@ class _Stand:
         """The site for these rates: one for all h, since a surface is affine in its height."""
         self.ridge.resized(h=h, w=w)  # refuses rates that are none
         if w not in self.sites:
-            surface, base = (self.ridge.resized(h=h, w=w).surface(self.base) for h in (1, 0))
+            ridge = self.ridge.resized(w=w)
+            surface, base = surfaces_on(self.base, ridge, ridge.section)
             # The border of the flanks stays at all widths, and with it what is left of the face.
             like = next((site.like or site for site in self.sites.values()), None)
             self.sites[w] = Site(self.face, surface, base, like=like)

@@ -104,8 +104,8 @@ class Site:
                 raise ValueError(
                     "base: expected the knots of the surface, got others; make both from one ridge"
                 )
-        gap = np.abs(self.surface.poles - self.base.poles)[:, [0, -1]].max()
-        if gap > 1e-9 * self.size:
+        gap = max(np.abs(self.surface.poles[:, k] - self.base.poles[:, k]).max() for k in (0, -1))
+        if gap > 1e-9 * self.base.size:
             raise ValueError(
                 f"base: expected borders of the surface, they are {gap:.3g} apart; make both from one ridge"
             )
@@ -153,11 +153,6 @@ class Site:
     def volume(self) -> VolumeByHeight:
         """The volume under the surface."""
         return VolumeByHeight(self.surface, self.base)
-
-    @cached_property
-    def size(self) -> float:
-        """Largest extent along an axis."""
-        return float(np.ptp(self.base.poles, axis=(0, 1)).max())
 
     @cached_property
     def breadth(self) -> float:

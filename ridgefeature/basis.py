@@ -6,6 +6,8 @@ No compiled code here: what a CAD script imports must stay light and survive a m
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -30,8 +32,8 @@ def greville(knots: ArrayLike, degree: int) -> Floats:
     """Greville abscissae (n_poles,): the mean of `degree` consecutive knots for each pole."""
     k, _ = checked_knots(knots, degree)
     n = k.size - degree - 1
-    windows = np.lib.stride_tricks.sliding_window_view(k[1:-1], degree)
-    return np.clip(np.mean(windows, axis=1), k[degree], k[n])  # a mean of equal knots may round outwards
+    means = np.add.reduce([k[i : n + i] for i in range(1, degree + 1)]) / degree
+    return np.clip(means, k[degree], k[n])  # a mean of equal knots may round outwards
 
 
 def basis_matrix(knots: ArrayLike, degree: int, at: ArrayLike, derivative: int = 0) -> Floats:
@@ -62,9 +64,12 @@ def interpolate(knots: ArrayLike, degree: int, values: ArrayLike) -> Floats:
             f"expected {sites.size} values, one for each Greville abscissa, got shape {v.shape}; "
             "sample at greville(knots, degree)"
         )
-    matrix = basis_matrix(knots, degree, sites)
-    poles = np.linalg.solve(matrix, v.reshape(sites.size, -1))
-    return np.asarray(poles, dtype=np.float64).reshape(v.shape)
+    return solved(basis_matrix(knots, degree, sites), v.reshape(sites.size, -1)).reshape(v.shape)
+
+
+def solved(matrix: Floats, values: Floats) -> Floats:
+    """Poles (n, d) for values (n, d) at places, of which the matrix (n, n) has the basis functions."""
+    return np.asarray(np.linalg.solve(matrix, values), dtype=np.float64)
 
 
 def local_basis(
@@ -96,6 +101,27 @@ def local_basis(
             values[:-1] += ahead[:q] * share
     values[:, nan] = np.nan
     return span - degree, np.ascontiguousarray(values.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Parameters (m,) at which curves of the same knots are evaluated, again and again.
+
+    near: the poles that bear on each, basis: how much; (m, degree + 1).
+    """
+
+    near: NDArray[np.intp]
+    basis: Floats
+
+    @staticmethod
+    def at(knots: Floats, degree: int, t: Floats, derivative: int = 0) -> Places:
+        """Parameters t (m,) on knots as checked_knots returns them; see local_basis."""
+        first, basis = local_basis(knots, degree, t, derivative)
+        return Places(first[:, None] + np.arange(degree + 1), basis)
+
+    def __call__(self, poles: Floats) -> Floats:
+        """Points (m, d) of the curve with these poles (n, d)."""
+        return np.einsum("mi,mid->md", self.basis, poles[self.near])
 
 
 def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> tuple[Floats, int]:

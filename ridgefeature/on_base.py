@@ -72,17 +72,24 @@ def surface_on(base: Base, stations: Stations, section: Section) -> Surface:
     Raises ValueError where the base is none, its length is not the ridge's, it returns anything but finite
     arrays, or it is closed and the ridge's ends do not meet.
     """
+    return surfaces_on(base, stations, section)[0]
+
+
+def surfaces_on(base: Base, stations: Stations, section: Section) -> tuple[Surface, Surface]:
+    """The surface of a ridge on a base, and that of the same ridge with height 0; see surface_on."""
     _check(base, stations)
     layout = _kept_layout(base, stations, section)
     width, border, height = (layout.spread @ x for x in (stations.width, stations.border, stations.height))
     sideways, raised = row_controls(section, width, border, height, layout.flank)
     points, normals = _on(base, layout.s, sideways @ layout.across.T)
     lift = (raised @ layout.across.T)[..., None] * normals
-    columns = np.matmul(layout.columns_to_poles, points) + np.matmul(layout.lift_to_poles, lift)
-    poles = np.tensordot(layout.rows_to_poles, columns, 1)
+    columns = np.matmul(layout.columns_to_poles, points), np.matmul(layout.lift_to_poles, lift)
+    flat, rise = (np.tensordot(layout.rows_to_poles, c, 1) for c in columns)
     if base.closed:
-        poles[-1] = poles[0]
-    return Surface(poles, layout.knots_u, layout.knots_v, DEGREE, DEGREE)
+        for poles in (flat, rise):
+            poles[-1] = poles[0]
+    knots = layout.knots_u, layout.knots_v
+    return Surface(flat + rise, *knots, DEGREE, DEGREE), Surface(flat, *knots, DEGREE, DEGREE)
 
 
 def _check(base: Base, stations: Stations) -> None:
