@@ -14,6 +14,9 @@ from ridgefeature.bspline import Curve, Surface, basis_matrix, clamped_knots, gr
 Floats = NDArray[np.float64]
 
 
+_SAMPLES = 32  # a knot span, to find where a row leaves the base
+
+
 @dataclass(frozen=True, eq=False)
 class Lift:
     """A stretch of an end row that is off the base, and the ruled surface between the two.
@@ -67,36 +70,40 @@ def _stretches(gap: Curve, least: float) -> list[tuple[float, float]]:
     starts, ends = (changes[sign[changes + k] != 0] for k in (1, 0))
     ends = ends[ends > starts[0]] if starts.size else starts
     starts = starts[: len(ends)]
-    off, on = v[np.concatenate([starts, ends + 1])], v[np.concatenate([starts + 1, ends])]
-    return [(a, b) for a, b in _edges(gap, least, off, on).reshape(2, -1).T.tolist()]
+    off, on = np.concatenate([starts, ends + 1]), np.concatenate([starts + 1, ends])
+    return [(a, b) for a, b in _edges(v, g, gap.degree, least, off, on).reshape(2, -1).T.tolist()]
 
 
 @lru_cache(8)  # the same for all widths
 def _looked_at(knots: bytes, degree: int, first: int, last: int) -> tuple[Floats, Places]:
     """Parameters close together where poles from first to last bear on a curve."""
     own = np.frombuffer(knots)
-    v = _halved(np.unique(own[first : last + degree + 2]), 32)
+    v = _halved(np.unique(own[first : last + degree + 2]), _SAMPLES)
     return v, Places.at(own, degree, v)
 
 
-def _edges(gap: Curve, least: float, off: Floats, on: Floats) -> Floats:
-    """Where the gap reaches `least`: between parameters (m,) where it is smaller and where it is larger.
+def _edges(
+    v: Floats, g: Floats, degree: int, least: float, off: NDArray[np.intp], on: NDArray[np.intp]
+) -> Floats:
+    """Where the gap g (n, 3) at parameters v (n,) reaches `least`, between samples `off` and `on` (m,) of it.
 
-    No knot is between them, so that the gap is a polynomial there.
+    Between knots the gap is a polynomial: that through degree + 1 samples of the same span.
     """
-    x = np.linspace(0.0, 1.0, gap.degree + 1)
-    values = gap(off + x[:, None] * (on - off))
-    terms = np.tensordot(np.linalg.inv(np.vander(x)), values, 1)
-    low, high = np.zeros(len(off)), np.ones(len(off))
+    low = np.minimum(off, on)
+    span = low // _SAMPLES * _SAMPLES
+    start = np.clip(low - 1, span, span + _SAMPLES - degree)
+    places = np.arange(degree + 1)
+    terms = np.tensordot(np.linalg.inv(np.vander(places)), g[start + places[:, None]], 1)
+    below, above = off - start, on - start
+    row = np.arange(len(off))
     for _ in range(4):
-        x = np.linspace(low, high, 33)
-        g = np.zeros(3)
+        x = np.linspace(below, above, 33)
+        found = np.zeros(3)
         for term in terms:
-            g = g * x[..., None] + term
-        first = np.argmax((g**2).sum(axis=-1) >= least**2, axis=0)
-        row = np.arange(len(off))
-        low, high = x[np.maximum(first - 1, 0), row], x[first, row]
-    return off + high * (on - off)
+            found = found * x[..., None] + term
+        first = np.argmax((found**2).sum(axis=-1) >= least**2, axis=0)
+        below, above = x[np.maximum(first - 1, 0), row], x[first, row]
+    return v[start] + above * (v[start + 1] - v[start])
 
 
 def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepTools import BRepTools
-from OCP.Geom import Geom_Surface
+from OCP.Geom import Geom_BSplineCurve, Geom_Surface
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.GeomAbs import (
     GeomAbs_Cone,
@@ -32,6 +32,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 
 from cad_export import occt_arrays
 from cad_export.check import subshapes
+from cad_export.host_surface import Evaluator, elementary
 from ridgefeature.basis import Places, solved
 from ridgefeature.bspline import Curve, basis_matrix, clamped_knots, greville
 
@@ -54,6 +55,10 @@ class HostSurface:
     @cached_property
     def _adaptor(self) -> GeomAdaptor_Surface:
         return GeomAdaptor_Surface(self.geometry)
+
+    @cached_property
+    def _jet(self) -> Evaluator | None:
+        return elementary(self._adaptor)
 
     @cached_property
     def plane(self) -> gp_Pln | None:
@@ -84,6 +89,8 @@ class HostSurface:
 
     def points(self, uv: Floats) -> Floats:
         """(n, 3) points of the surface at parameters (n, 2)."""
+        if self._jet:
+            return self._jet(uv[:, 0], uv[:, 1], 1)[0]
         return np.array([self._adaptor.Value(u, v).Coord() for u, v in uv.tolist()])
 
     def _on_plane(self, points: Floats) -> Floats:
@@ -207,16 +214,20 @@ def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) 
     return clamped_knots(np.interp(at, np.arange(len(breaks)), breaks), degree)
 
 
-def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
-    """A plane curve, poles (n, 2), with the same poles and knots in OCCT; kept, as sliders ask again."""
-    return _curve2d(curve.poles.tobytes(), curve.knots.tobytes(), curve.degree)
+def occt_curve(curve: Curve) -> Geom_BSplineCurve | Geom2d_BSplineCurve:
+    """A curve, poles (n, 3) or (n, 2), with the same poles and knots in OCCT; kept, as sliders ask again."""
+    return _occt_curve(curve.poles.tobytes(), curve.poles.shape[1], curve.knots.tobytes(), curve.degree)
 
 
 @lru_cache(_KEPT_CURVES)
-def _curve2d(poles: bytes, knots: bytes, degree: int) -> Geom2d_BSplineCurve:
-    breaks, counts = np.unique(np.frombuffer(knots), return_counts=True)
-    points = occt_arrays.points1_2d(np.frombuffer(poles).reshape(-1, 2))
-    return Geom2d_BSplineCurve(points, occt_arrays.reals(breaks), occt_arrays.integers(counts), degree)
+def _occt_curve(
+    poles: bytes, dimension: int, knots: bytes, degree: int
+) -> Geom_BSplineCurve | Geom2d_BSplineCurve:
+    where = *occt_arrays.knots(knots), degree
+    points = np.frombuffer(poles).reshape(-1, dimension)
+    if dimension == 2:
+        return Geom2d_BSplineCurve(occt_arrays.points1_2d(points), *where)
+    return Geom_BSplineCurve(occt_arrays.points1(points), *where)
 
 
 def wires_of(face: TopoDS_Face) -> list[TopoDS_Wire]:

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.Adaptor3d import Adaptor3d_Surface
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import (
     GeomAbs_BSplineSurface,
@@ -106,26 +107,31 @@ def dot(a: Floats, b: Floats) -> Floats:
 def _cross(a: Floats, b: Floats) -> Floats:
     """Vector products (..., 3), by coordinates: three times as fast as np.cross for many."""
     (ax, ay, az), (bx, by, bz) = (np.ascontiguousarray(np.moveaxis(c, -1, 0)) for c in (a, b))
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+    return np.moveaxis(np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]), 0, -1)
 
 
 def host_of(face: TopoDS_Face) -> Host:
     """The surface under a face, placed by the face's location."""
     adaptor = BRepAdaptor_Surface(face, False)
+    kind = adaptor.GetType()
     periods = (
         float(adaptor.UPeriod()) if adaptor.IsUPeriodic() else 0.0,
         float(adaptor.VPeriod()) if adaptor.IsVPeriodic() else 0.0,
     )
     outward = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
-    jet = _jet(adaptor, periods)
-    if jet is None:
-        return Host(face, _one_by_one(adaptor), periods, outward)
-    straight = adaptor.GetType() in (GeomAbs_Plane, GeomAbs_Cylinder)
-    return Host(face, jet, periods, outward, straight=straight)
+    jet = elementary(adaptor)
+    if (
+        jet is None
+        and kind == GeomAbs_BSplineSurface
+        and not (adaptor.IsURational() or adaptor.IsVRational())
+    ):
+        jet = _spline(adaptor, periods)
+    straight = kind in (GeomAbs_Plane, GeomAbs_Cylinder)
+    return Host(face, jet or _one_by_one(adaptor), periods, outward, straight)
 
 
-def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Evaluator | None:
-    """The surface in closed form or by its poles, None for kinds that have to be evaluated by OCCT."""
+def elementary(adaptor: Adaptor3d_Surface) -> Evaluator | None:
+    """A plane or a surface of revolution that OCCT has by name, in closed form; None for others."""
     kind = adaptor.GetType()
     if kind == GeomAbs_Plane:
         return _plane(_axes(adaptor.Plane().Position()))
@@ -146,8 +152,6 @@ def _jet(adaptor: BRepAdaptor_Surface, periods: tuple[float, float]) -> Evaluato
         form = adaptor.Sphere() if kind == GeomAbs_Sphere else adaptor.Torus()
         large = 0.0 if kind == GeomAbs_Sphere else form.MajorRadius()
         return _revolved(_axes(form.Position()), _circle(large, _small_radius(form)))
-    if kind == GeomAbs_BSplineSurface and not (adaptor.IsURational() or adaptor.IsVRational()):
-        return _spline(adaptor, periods)
     return None
 
 
@@ -181,9 +185,12 @@ def _circle(large: float, small: float) -> Callable[[Floats], Jet]:
 def _revolved(axes: Floats, meridian: Callable[[Floats], Jet]) -> Evaluator:
     """r(v) (cos u x + sin u y) + z(v) z, for r, r', r'', z, z', z'' from the meridian."""
 
+    turn = np.ascontiguousarray(axes[1:].T)
+
     def placed(*parts: Floats) -> Floats:
-        flat = np.stack(np.broadcast_arrays(*parts), axis=-1)
-        return (flat.reshape(-1, 3) @ axes[1:]).reshape(flat.shape)
+        # by coordinates, in memory too: twice as fast as point by point
+        flat = np.stack(np.broadcast_arrays(*parts))
+        return np.moveaxis((turn @ flat.reshape(3, -1)).reshape(flat.shape), 0, -1)
 
     def jet(u: Floats, v: Floats, order: int = 2) -> Jet:
         cos, sin, none = np.cos(u), np.sin(u), 0.0 * u
