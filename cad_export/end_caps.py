@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +70,9 @@ def _stretches(gap: Curve, least: float) -> list[tuple[float, float]]:
     starts, ends = (changes[sign[changes + k] != 0] for k in (1, 0))
     ends = ends[ends > starts[0]] if starts.size else starts
     starts = starts[: len(ends)]
-    off, on = np.concatenate([starts, ends + 1]), np.concatenate([starts + 1, ends])
-    return [(a, b) for a, b in _edges(v, g, gap.degree, least, off, on).reshape(2, -1).T.tolist()]
+    pairs = zip(starts.tolist(), ends.tolist(), strict=True)
+    edge = partial(_edge, v, g, gap.degree, least)
+    return [(edge(i, i + 1), edge(k + 1, k)) for i, k in pairs]
 
 
 @lru_cache(8)  # the same for all widths
@@ -82,28 +83,29 @@ def _looked_at(knots: bytes, degree: int, first: int, last: int) -> tuple[Floats
     return v, Places.at(own, degree, v)
 
 
-def _edges(
-    v: Floats, g: Floats, degree: int, least: float, off: NDArray[np.intp], on: NDArray[np.intp]
-) -> Floats:
-    """Where the gap g (n, 3) at parameters v (n,) reaches `least`, between samples `off` and `on` (m,) of it.
+def _edge(v: Floats, g: Floats, degree: int, least: float, off: int, on: int) -> float:
+    """Where the gap, g (n, 3) at parameters v (n,), reaches `least`: between the samples `off` and `on`.
 
-    Between knots the gap is a polynomial: that through degree + 1 samples of the same span.
+    Between knots the gap is a polynomial: that through degree + 1 samples of the same span. By bisection.
     """
-    low = np.minimum(off, on)
-    span = low // _SAMPLES * _SAMPLES
-    start = np.clip(low - 1, span, span + _SAMPLES - degree)
-    places = np.arange(degree + 1)
-    terms = np.tensordot(np.linalg.inv(np.vander(places)), g[start + places[:, None]], 1)
-    below, above = off - start, on - start
-    row = np.arange(len(off))
-    for _ in range(4):
-        x = np.linspace(below, above, 33)
-        found = np.zeros(3)
+    span = min(off, on) // _SAMPLES * _SAMPLES
+    start = min(max(min(off, on) - 1, span), span + _SAMPLES - degree)
+    terms = _through(degree) @ g[start : start + degree + 1]
+    *terms, last = np.sum([np.convolve(term, term) for term in terms.T], axis=0).tolist()
+    below, above = 0.0, 1.0
+    for _ in range(20):
+        middle = 0.5 * (below + above)
+        x, square = off - start + middle * (on - off), 0.0
         for term in terms:
-            found = found * x[..., None] + term
-        first = np.argmax((found**2).sum(axis=-1) >= least**2, axis=0)
-        below, above = x[np.maximum(first - 1, 0), row], x[first, row]
-    return v[start] + above * (v[start + 1] - v[start])
+            square = (square + term) * x
+        below, above = (below, middle) if square + last >= least**2 else (middle, above)
+    return float(v[off] + above * (v[on] - v[off]))
+
+
+@lru_cache(8)
+def _through(degree: int) -> Floats:
+    """From values at 0, 1, ..., degree to a polynomial's coefficients, the highest power first."""
+    return np.asarray(np.linalg.inv(np.vander(np.arange(degree + 1))), dtype=np.float64)
 
 
 def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:

@@ -88,11 +88,11 @@ class FaceBase:
         if not y.any():  # the path itself
             return np.repeat(self.path(np.clip(s, 0.0, self.length))[0][:, None], y.shape[1], axis=1)
         reach, coefficients = self._polynomials(s, np.abs(y).max(axis=1))
-        powers = np.polynomial.chebyshev.chebvander(y / reach[:, None], _DEGREE)
+        powers = np.polynomial.chebyshev.chebvander(y / reach[:, None], coefficients.shape[1] - 1)
         return np.asarray(np.matmul(powers, coefficients), dtype=np.float64)
 
     def _polynomials(self, s: Floats, needed: Floats) -> tuple[Floats, Floats]:
-        """Reach (k,) and Chebyshev coefficients (k, degree + 1, 2) of the parameters over it."""
+        """Reach (k,) and Chebyshev coefficients (k, terms, 2) of the parameters over it."""
         key = s.tobytes()
         if key not in self.kept:
             if len(self.kept) >= _KEPT:
@@ -111,9 +111,7 @@ class FaceBase:
         left = np.cross(self.host.normal(pu, pv), ahead)
         aside = self.host.parameters(left / np.linalg.norm(left, axis=1, keepdims=True), pu, pv)
         if self.host.straight:
-            line = np.zeros((len(s), _DEGREE + 1, 2))
-            line[:, 0], line[:, 1] = x, reach[:, None] * aside
-            return reach, line
+            return reach, np.stack([x, reach[:, None] * aside], axis=1)
         start, rates = np.concatenate([x, x]), np.concatenate([aside, -aside])
         half = _DEGREE // 2
         nodes = np.sin(0.5 * np.pi * np.arange(half + 1) / half)  # Chebyshev points, from 0 to 1

@@ -165,11 +165,10 @@ class Site:
         Raises ValueError where it is off the face or winds round it.
         """
         host = surface_on(self.face)
-        sides, ends = (
-            (self._side(0), self._side(-1)),
-            () if self.base.closed[0] else (self._end(-1), self._end(0)),
-        )
-        rounds = [[side] for side in sides] if not ends else [[sides[0], ends[0], sides[1], ends[1]]]
+        sides = self._side(0), self._side(-1)
+        rounds = [[side] for side in sides]
+        if not self.base.closed[0]:
+            rounds = [[sides[0], self._end(-1), sides[1], self._end(0)]]
         made = []
         for parts in rounds:
             found: list[OnHost] = []
@@ -182,9 +181,11 @@ class Site:
                 raise SeamError("surface: expected a border that closes on the face, it winds round it")
             line = np.concatenate([f.polyline[:-1] for f in found])
             shift = self._shift(line, host.periods)
-            flats = [occt_curve(replace(f.flat, poles=f.flat.poles + shift)) for f in found]
+            flats = [f.flat for f in found]
+            if shift.any():
+                flats = [replace(flat, poles=flat.poles + shift) for flat in flats]
             lines = (
-                Line(curve, occt_curve(curve), flat, f.distance, forward)
+                Line(curve, occt_curve(curve), occt_curve(flat), f.distance, forward)
                 for (curve, _, forward), flat, f in zip(parts, flats, found, strict=True)
             )
             made.append(Loop(tuple(lines), line + shift))
