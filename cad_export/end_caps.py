@@ -43,6 +43,8 @@ class Lift:
 
     def times(self, factor: float) -> Lift:
         """The same stretch with the row `factor` times as far off the base, factor above 0."""
+        if factor == 1:
+            return self
         rise = replace(self.rise, poles=factor * self.rise.poles)
         return replace(self, reach=factor * self.reach, rise=rise, distance=factor * self.distance)
 

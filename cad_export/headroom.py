@@ -104,15 +104,16 @@ class _Place:
         Below and above; inf without one.
         """
         points, normals = self.base.host.frame(x[..., 0], x[..., 1])
+        faces, near, far = self.faces, self.near, self.far
         gaps = []
         for p, d in np.stack([points, normals], axis=-2).reshape(-1, 2, 3).tolist():
-            self.faces.Perform(gp_Lin(gp_Pnt(*p), gp_Dir(*d)), -self.far, self.far)
+            faces.Perform(gp_Lin(gp_Pnt(*p), gp_Dir(*d)), -far, far)
             below = above = np.inf
-            for k in range(1, self.faces.NbPnt() + 1):
-                at = self.faces.WParameter(k)
-                if at > self.near:
+            for k in range(1, faces.NbPnt() + 1):
+                at = faces.WParameter(k)
+                if at > near:
                     above = min(above, at)
-                elif at < -self.near:
+                elif at < -near:
                     below = min(below, -at)
             gaps.append((below, above))
         return np.array(gaps).T.reshape(2, *x.shape[:-1])

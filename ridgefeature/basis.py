@@ -84,8 +84,8 @@ def local_basis(
         raise ValueError(f"expected a derivative order of 0 or more, got {derivative}")
     t, nan = _inside(knots, degree, at)
     n = knots.size - degree - 1
-    last = np.searchsorted(knots, knots[n], side="left") - 1  # the last span that is not empty
-    span = np.minimum(np.searchsorted(knots, t, side="right") - 1, last)
+    last = knots.searchsorted(knots[n], side="left") - 1  # the last span that is not empty
+    span = np.minimum(knots.searchsorted(t, side="right") - 1, last)
     near = knots[span + np.arange(1 - degree, degree + 1)[:, None]]
     behind, ahead = t - near[:degree], near[degree:] - t
     values = np.full((1, t.size), 1.0 if derivative <= degree else 0.0)
@@ -99,7 +99,8 @@ def local_basis(
         else:
             values[1:] = behind[degree - q :] * share
             values[:-1] += ahead[:q] * share
-    values[:, nan] = np.nan
+    if nan is not None:
+        values[:, nan] = np.nan
     return span - degree, np.ascontiguousarray(values.T)
 
 
@@ -146,12 +147,12 @@ def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> 
     return k, n
 
 
-def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Parameters clipped to the domain by no more than rounding, and which of them were NaN."""
+def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_] | None]:
+    """Parameters clipped to the domain by no more than rounding, and which of them were NaN, None if none."""
     low, high = knots[degree], knots[knots.size - degree - 1]
     slack = 1e-12 * max(high - low, abs(low), abs(high))
     if at.size and at.min() >= low - slack and at.max() <= high + slack:  # not for NaN
-        return np.clip(at, low, high), np.zeros(at.shape, dtype=np.bool_)
+        return at.clip(low, high), None
     nan = np.isnan(at)
     outside = (at < low - slack) | (at > high + slack)
     if outside.any():
