@@ -111,8 +111,7 @@ class Change:
     @cached_property
     def largest_tolerance(self) -> float:
         """Largest tolerance of the edges of new faces."""
-        edges = (e for f in (*self.new, *self.remaining) for e in subshapes(f, TopAbs_EDGE))
-        return max(BRep_Tool.Tolerance_s(TopoDS.Edge_s(e)) for e in edges)
+        return max(BRep_Tool.MaxTolerance_s(f, TopAbs_EDGE) for f in (*self.new, *self.remaining))
 
 
 def _cone(face: TopoDS_Face, point: gp_Pnt, accuracy: float) -> float:
