@@ -34,7 +34,7 @@ from cad_export import occt_arrays
 from cad_export.check import subshapes
 from cad_export.host_surface import Evaluator, elementary
 from ridgefeature.basis import Places, solved
-from ridgefeature.bspline import Curve, basis_matrix, clamped_knots, greville
+from ridgefeature.bspline import Curve, clamped_knots, greville
 
 Floats = NDArray[np.float64]
 
@@ -170,7 +170,7 @@ def _on_host(
     for k, period in enumerate(host.periods):
         if period:
             uv[:, k] += period * np.round(shift[k] / period)
-    flat = Curve(solved(to.sites, uv), to.knots, curve.degree)
+    flat = Curve(solved(to.flat_at_sites.matrix(len(uv)), uv), to.knots, curve.degree)
     fine = to.flat_fine(flat.poles)
     off = np.linalg.norm(host.points(fine) - to.curve_fine(curve.poles), axis=1)
     line = fine[::2]
@@ -181,12 +181,11 @@ def _on_host(
 class _Flattening:
     """What the parameter curves of all curves with the same knots have in common.
 
-    knots: theirs. sites: their basis functions (n, n) at the sites where they are interpolated. fine: places
-    between, for the distance.
+    knots: theirs. Places: the sites where they are interpolated, and fine ones between, for the distance.
     """
 
     knots: Floats
-    sites: Floats
+    flat_at_sites: Places
     curve_at_sites: Places
     flat_fine: Places
     curve_fine: Places
@@ -196,12 +195,9 @@ class _Flattening:
 def _flattening(knots: bytes, degree: int, span: tuple[float, float]) -> _Flattening:
     own = np.frombuffer(knots)
     flat = _refined(own, degree, span, _SPLIT)
-    sites = greville(flat, degree)
     fine = _refined(own, degree, span, 4 * _SPLIT)[degree:-degree]
-    at_sites, at_fine = (Places.at(own, degree, t) for t in (sites, fine))
-    return _Flattening(
-        flat, basis_matrix(flat, degree, sites), at_sites, Places.at(flat, degree, fine), at_fine
-    )
+    places = [Places.at(k, degree, t) for t in (greville(flat, degree), fine) for k in (flat, own)]
+    return _Flattening(flat, *places)
 
 
 def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:

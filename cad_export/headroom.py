@@ -8,9 +8,9 @@ IntCurvesFace_ShapeIntersector). OCP only, no cadquery.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ _ETA = np.linspace(-0.5, 0.5, 17)
 _LINES = slice(4, 13, 4)  # which of them look for other faces: the crest and halfway to the feet
 _BESIDE = slice(4, 13, 8)  # the latter
 _ROOM = 0.98  # of a radius: nearer to it the surface's normals turn too fast for CAD
-_KEPT = 4
+_KEPT, _KEPT_PLACES = 4, 16
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class _Place:
         return np.array(gaps).T.reshape(2, *x.shape[:-1])
 
 
-_PLACES: WeakKeyDictionary[FaceBase, list[_Place]] = WeakKeyDictionary()
+_PLACES: deque[_Place] = deque(maxlen=_KEPT_PLACES)
 
 
 def check_height(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge, h: float = 1.0) -> None:
@@ -146,11 +146,10 @@ def check_height(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge, h: float = 1
 
 
 def _known(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge) -> Headroom:
-    places = _PLACES.setdefault(base, [])
-    place = next((p for p in places if p.solid.IsSame(solid)), None) or _Place(solid, base)
-    if place not in places:
-        places.append(place)
-        del places[:-_KEPT]
+    place = next((p for p in _PLACES if p.base is base and p.solid.IsSame(solid)), None)
+    if place is None:
+        place = _Place(solid, base)
+        _PLACES.append(place)
     for same, room in place.found:
         if _alike(same, ridge):
             return room

@@ -119,15 +119,10 @@ def host_of(face: TopoDS_Face) -> Host:
         float(adaptor.VPeriod()) if adaptor.IsVPeriodic() else 0.0,
     )
     outward = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
-    jet = elementary(adaptor)
-    if (
-        jet is None
-        and kind == GeomAbs_BSplineSurface
-        and not (adaptor.IsURational() or adaptor.IsVRational())
-    ):
-        jet = _spline(adaptor, periods)
-    straight = kind in (GeomAbs_Plane, GeomAbs_Cylinder)
-    return Host(face, jet or _one_by_one(adaptor), periods, outward, straight)
+    rational = adaptor.IsURational() or adaptor.IsVRational()
+    by_poles = _spline(adaptor, periods) if kind == GeomAbs_BSplineSurface and not rational else None
+    jet = elementary(adaptor) or by_poles or _one_by_one(adaptor)
+    return Host(face, jet, periods, outward, straight=kind in (GeomAbs_Plane, GeomAbs_Cylinder))
 
 
 def elementary(adaptor: Adaptor3d_Surface) -> Evaluator | None:

@@ -45,10 +45,7 @@ def basis_matrix(knots: ArrayLike, degree: int, at: ArrayLike, derivative: int =
     t = np.atleast_1d(np.asarray(at, dtype=np.float64))
     if t.ndim != 1:
         raise ValueError(f"expected parameters of shape (m,), got {t.shape}; pass at.ravel()")
-    first, values = local_basis(k, degree, t, derivative)
-    matrix = np.zeros((t.size, k.size - degree - 1))
-    np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values, axis=1)
-    return matrix
+    return Places.at(k, degree, t, derivative).matrix(k.size - degree - 1)
 
 
 def interpolate(knots: ArrayLike, degree: int, values: ArrayLike) -> Floats:
@@ -119,6 +116,12 @@ class Places:
         """Parameters t (m,) on knots as checked_knots returns them; see local_basis."""
         first, basis = local_basis(knots, degree, t, derivative)
         return Places(first[:, None] + np.arange(degree + 1), basis)
+
+    def matrix(self, n: int) -> Floats:
+        """(m, n) basis functions of all n poles, dense."""
+        matrix = np.zeros((len(self.near), n))
+        np.put_along_axis(matrix, self.near, self.basis, axis=1)
+        return matrix
 
     def __call__(self, poles: Floats) -> Floats:
         """Points (m, d) of the curve with these poles (n, d)."""
