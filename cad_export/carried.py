@@ -31,6 +31,7 @@ class _Entry(NamedTuple):
     surface: Geom_Surface  # held, so that its identity is not given to another
     location: TopLoc_Location
     record: Carried | None  # None: taken off
+    outline: tuple[int, ...] | None  # what a copy of the surface has in common with it
 
 
 # A reload of this module keeps what is already attached.
@@ -53,7 +54,7 @@ def attach(face_or_surface: Any, record: Carried | None) -> None:
         raise ValueError(f"expected a Carried record or None, got {type(record).__name__}; make one first")
     with _LOCK:
         _ENTRIES.pop(id(surface), None)
-        _ENTRIES[id(surface)] = _Entry(surface, location, record)
+        _ENTRIES[id(surface)] = _Entry(surface, location, record, _outline(surface))
         _forget()
 
 
@@ -70,15 +71,17 @@ def carried_by(shape: Any) -> list[tuple[TopoDS_Face, Carried]]:
         surface, location = _surface(face)
         with _LOCK:
             entry = _ENTRIES.get(id(surface))
-            candidates = [] if entry else list(_ENTRIES.values())
+            outline = None if entry else _outline(surface)
+            candidates = (
+                [e for e in _ENTRIES.values() if e.record and e.outline == outline] if outline else []
+            )
         if entry:
             found += [(face, _moved(entry, entry.record, location, np.eye(4)))] if entry.record else []
-        elif isinstance(surface, Geom_BSplineSurface):
-            for entry in reversed(candidates):  # the youngest first
-                move = _rigid_motion(entry.surface, surface) if entry.record else None
-                if entry.record and move is not None:
-                    found.append((face, _moved(entry, entry.record, location, move)))
-                    break
+        for other in reversed(candidates):  # the youngest first
+            move = _rigid_motion(other.surface, surface)
+            if other.record and move is not None:
+                found.append((face, _moved(other, other.record, location, move)))
+                break
     return found
 
 
@@ -134,13 +137,11 @@ def _matrix(location: TopLoc_Location) -> Floats:
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
-def _rigid_motion(old: Geom_Surface, new: Geom_BSplineSurface) -> Floats | None:
-    """The motion (4, 4) that takes the poles of `old` to those of `new`; None if there is none to 1e-9.
+def _rigid_motion(old: Geom_BSplineSurface, new: Geom_BSplineSurface) -> Floats | None:
+    """The motion (4, 4) that takes the poles of `old` to those of `new`, as many; None if none does to 1e-9.
 
     Least squares by singular values (Kabsch 1976); mirrored poles are no match.
     """
-    if not isinstance(old, Geom_BSplineSurface) or _outline(old) != _outline(new):
-        return None
     ends = [g.Pole(1, 1).Distance(g.Pole(g.NbUPoles(), g.NbVPoles())) for g in (old, new)]
     if abs(ends[0] - ends[1]) > 1e-9 * max(*ends, 1.0):  # cheap, and enough for nearly all others
         return None
@@ -157,5 +158,8 @@ def _rigid_motion(old: Geom_Surface, new: Geom_BSplineSurface) -> Floats | None:
     return move
 
 
-def _outline(g: Geom_BSplineSurface) -> tuple[int, ...]:
+def _outline(g: Geom_Surface) -> tuple[int, ...] | None:
+    """Numbers that tell most B-spline surfaces apart, None for others."""
+    if not isinstance(g, Geom_BSplineSurface):
+        return None
     return g.NbUPoles(), g.NbVPoles(), g.UDegree(), g.VDegree(), g.NbUKnots(), g.NbVKnots()

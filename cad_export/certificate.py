@@ -100,8 +100,7 @@ class Change:
     @property
     def volume_error(self) -> float:
         """By how much the volume added may differ: VOLUME, and OCCT's own precision over the footprint."""
-        extent = float(np.ptp(self.base.poles, axis=(0, 1)).max())
-        return VOLUME * abs(self.volume_expected) + 1e-6 * self.breadth**2 * extent
+        return VOLUME * abs(self.volume_expected) + 1e-6 * self.breadth**2 * self.base.size
 
     @cached_property
     def breadth(self) -> float:
@@ -112,8 +111,7 @@ class Change:
     @cached_property
     def largest_tolerance(self) -> float:
         """Largest tolerance of the edges of new faces."""
-        edges = (e for f in (*self.new, *self.remaining) for e in subshapes(f, TopAbs_EDGE))
-        return max(BRep_Tool.Tolerance_s(TopoDS.Edge_s(e)) for e in edges)
+        return max(BRep_Tool.MaxTolerance_s(f, TopAbs_EDGE) for f in (*self.new, *self.remaining))
 
 
 def _cone(face: TopoDS_Face, point: gp_Pnt, accuracy: float) -> float:

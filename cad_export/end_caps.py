@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.basis import basis_matrix, interpolate
-from ridgefeature.bspline import Curve, Surface, clamped_knots, greville
+from ridgefeature.basis import Places, solved
+from ridgefeature.bspline import Curve, Surface, basis_matrix, clamped_knots, greville
 
 Floats = NDArray[np.float64]
+
+
+_SAMPLES = 32  # a knot span, to find where a row leaves the base
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,8 @@ class Lift:
 
     def times(self, factor: float) -> Lift:
         """The same stretch with the row `factor` times as far off the base, factor above 0."""
+        if factor == 1:
+            return self
         rise = replace(self.rise, poles=factor * self.rise.poles)
         return replace(self, reach=factor * self.reach, rise=rise, distance=factor * self.distance)
 
@@ -58,27 +64,50 @@ def _stretches(gap: Curve, least: float) -> list[tuple[float, float]]:
     if apart.max() <= least:
         return []
     some = np.flatnonzero(apart)  # beyond what these poles bear on there is no gap
-    breaks = np.unique(gap.knots[some[0] : some[-1] + gap.degree + 2])
-    v = _halved(breaks, 32)
-    g = gap(v)
+    v, places = _looked_at(gap.knots.tobytes(), gap.degree, int(some[0]), int(some[-1]))
+    g = places(gap.poles)
     square = (g**2).sum(axis=1)
     sign = np.where(square > least**2, np.sign(g @ g[np.argmax(square)]), 0.0)
     changes = np.flatnonzero(np.diff(sign))
     starts, ends = (changes[sign[changes + k] != 0] for k in (1, 0))
     ends = ends[ends > starts[0]] if starts.size else starts
     starts = starts[: len(ends)]
-    off, on = v[np.concatenate([starts, ends + 1])], v[np.concatenate([starts + 1, ends])]
-    return [(a, b) for a, b in _edges(gap, least, off, on).reshape(2, -1).T.tolist()]
+    pairs = zip(starts.tolist(), ends.tolist(), strict=True)
+    edge = partial(_edge, v, g, gap.degree, least)
+    return [(edge(i, i + 1), edge(k + 1, k)) for i, k in pairs]
 
 
-def _edges(gap: Curve, least: float, off: Floats, on: Floats) -> Floats:
-    """Where the gap reaches `least`: between parameters (m,) where it is smaller and where it is larger."""
-    for _ in range(4):
-        t = np.linspace(off, on, 33)
-        first = np.argmax((gap(t) ** 2).sum(axis=-1) >= least**2, axis=0)
-        row = np.arange(len(off))
-        off, on = t[np.maximum(first - 1, 0), row], t[first, row]
-    return on
+@lru_cache(8)  # the same for all widths
+def _looked_at(knots: bytes, degree: int, first: int, last: int) -> tuple[Floats, Places]:
+    """Parameters close together where poles from first to last bear on a curve."""
+    own = np.frombuffer(knots)
+    v = _halved(np.unique(own[first : last + degree + 2]), _SAMPLES)
+    return v, Places.at(own, degree, v)
+
+
+def _edge(v: Floats, g: Floats, degree: int, least: float, off: int, on: int) -> float:
+    """Where the gap, g (n, 3) at parameters v (n,), reaches `least`: between the samples `off` and `on`.
+
+    Between knots the gap is a polynomial: that through degree + 1 samples of the same span. By bisection.
+    """
+    span = min(off, on) // _SAMPLES * _SAMPLES
+    start = min(max(min(off, on) - 1, span), span + _SAMPLES - degree)
+    terms = _through(degree) @ g[start : start + degree + 1]
+    *terms, last = np.sum([np.convolve(term, term) for term in terms.T], axis=0).tolist()
+    below, above = 0.0, 1.0
+    for _ in range(20):
+        middle = 0.5 * (below + above)
+        x, square = off - start + middle * (on - off), 0.0
+        for term in terms:
+            square = (square + term) * x
+        below, above = (below, middle) if square + last >= least**2 else (middle, above)
+    return float(v[off] + above * (v[on] - v[off]))
+
+
+@lru_cache(8)
+def _through(degree: int) -> Floats:
+    """From values at 0, 1, ..., degree to a polynomial's coefficients, the highest power first."""
+    return np.asarray(np.linalg.inv(np.vander(np.arange(degree + 1))), dtype=np.float64)
 
 
 def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:
@@ -88,23 +117,26 @@ def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:
     shrink to points at both feet, but a curve on it.
     """
     inner = np.unique(gap.knots)
-    inner = inner[(inner > a) & (inner < b)]
-    knots = clamped_knots(np.concatenate([[a], inner, [b]]), 3)
-    fine = clamped_knots(_halved(np.concatenate([[a], inner, [b]]), 4), 3)
-    t = _halved(fine[3:-3], 3)
+    breaks = np.concatenate([[a], inner[(inner > a) & (inner < b)], [b]])
+    knots, fine = clamped_knots(breaks, 3), clamped_knots(_halved(breaks, 4), 3)
+    t, sites, rough = _halved(fine[3:-3], 3), greville(fine, 3), greville(knots, 3)
+    parts = len(t), len(t) + len(sites)
     both = Curve(np.hstack([base.poles, gap.poles]), base.knots, base.degree)
-    low, apart = np.split(both(t), 2, axis=1)
+    (low, apart), (_, gaps), (feet, _) = (
+        np.split(points, 2, axis=1) for points in np.split(both(np.concatenate([t, sites, rough])), parts)
+    )
+    at_t, at_sites, at_rough = np.split(basis_matrix(knots, 3, np.concatenate([t, sites, rough])), parts)
     mean = apart[np.argmax((apart**2).sum(axis=1))]
     size = np.linalg.norm(apart, axis=1, keepdims=True) * np.sign(apart @ mean)[:, None]
-    basis = basis_matrix(knots, 3, t)
-    up = np.linalg.lstsq(basis * size, apart, rcond=1e-9)[0]
-    foot = interpolate(knots, 3, base(greville(knots, 3)))
+    up = np.linalg.lstsq(at_t * size, apart, rcond=1e-9)[0]
+    foot = solved(at_rough, feet)
     reach = np.array([min(0.0, 1.25 * size.min()), max(0.0, 1.25 * size.max())])
-    sites = greville(fine, 3)
-    along = basis_matrix(knots, 3, sites) @ up
-    rise = Curve(interpolate(fine, 3, (gap(sites) * along).sum(1) / (along**2).sum(1))[:, None], fine, 3)
-    off = np.linalg.norm((basis @ up) * rise(t) - apart, axis=1).max()
-    off = max(float(off), float(np.linalg.norm(low - basis @ foot, axis=1).max()))
+    along = at_sites @ up
+    heights = (gaps * along).sum(1, keepdims=True) / (along**2).sum(1, keepdims=True)
+    fine_at_t, fine_at_sites = np.split(basis_matrix(fine, 3, np.concatenate([t, sites])), parts[:1])
+    rise = Curve(solved(fine_at_sites, heights), fine, 3)
+    off = np.linalg.norm((at_t @ up) * (fine_at_t @ rise.poles) - apart, axis=1).max()
+    off = max(float(off), float(np.linalg.norm(low - at_t @ foot, axis=1).max()))
     return Lift((a, b), knots, foot, up, reach, rise, off)
 
 

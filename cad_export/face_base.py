@@ -44,7 +44,6 @@ class FaceBase:
     reach: tuple[Floats, Floats]
     """Arc lengths (k,) and breadths (k,) of the strip to either side, for which polynomials are made."""
     kept: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
-    last: dict[tuple[Any, ...], tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
     slim: bool = False
     """Whether the flanks were narrowed."""
 
@@ -69,15 +68,8 @@ class FaceBase:
 
     def __call__(self, s: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Points on the face's surface and its outward unit normals (k, m, 3) at s (k,), y (k, m)."""
-        key = tuple((np.shape(a), np.asarray(a).tobytes()) for a in (s, y))
-        if key not in self.last:  # a surface and its base ask for the same
-            x = self.parameters(s, y)
-            found = self.host.frame(x[..., 0], x[..., 1])
-            for array in found:
-                array.setflags(write=False)
-            self.last.clear()
-            self.last[key] = found
-        return self.last[key]
+        x = self.parameters(s, y)
+        return self.host.frame(x[..., 0], x[..., 1])
 
     def parameters(self, s: Floats, y: Floats) -> Floats:
         """Parameters u, v (k, m, 2) on the face's surface at s (k,), y (k, m).
@@ -96,11 +88,11 @@ class FaceBase:
         if not y.any():  # the path itself
             return np.repeat(self.path(np.clip(s, 0.0, self.length))[0][:, None], y.shape[1], axis=1)
         reach, coefficients = self._polynomials(s, np.abs(y).max(axis=1))
-        powers = np.polynomial.chebyshev.chebvander(y / reach[:, None], _DEGREE)
+        powers = np.polynomial.chebyshev.chebvander(y / reach[:, None], coefficients.shape[1] - 1)
         return np.asarray(np.matmul(powers, coefficients), dtype=np.float64)
 
     def _polynomials(self, s: Floats, needed: Floats) -> tuple[Floats, Floats]:
-        """Reach (k,) and Chebyshev coefficients (k, degree + 1, 2) of the parameters over it."""
+        """Reach (k,) and Chebyshev coefficients (k, terms, 2) of the parameters over it."""
         key = s.tobytes()
         if key not in self.kept:
             if len(self.kept) >= _KEPT:
@@ -114,14 +106,12 @@ class FaceBase:
 
     def _integrated(self, s: Floats, reach: Floats) -> tuple[Floats, Floats]:
         x, rate = self.path(np.clip(s, 0.0, self.length))
-        _, pu, pv = self.host.jet(x[:, 0], x[:, 1])[:3]
+        _, pu, pv = self.host.jet(x[:, 0], x[:, 1], 1)[:3]
         ahead = rate[:, :1] * pu + rate[:, 1:] * pv
         left = np.cross(self.host.normal(pu, pv), ahead)
         aside = self.host.parameters(left / np.linalg.norm(left, axis=1, keepdims=True), pu, pv)
         if self.host.straight:
-            line = np.zeros((len(s), _DEGREE + 1, 2))
-            line[:, 0], line[:, 1] = x, reach[:, None] * aside
-            return reach, line
+            return reach, np.stack([x, reach[:, None] * aside], axis=1)
         start, rates = np.concatenate([x, x]), np.concatenate([aside, -aside])
         half = _DEGREE // 2
         nodes = np.sin(0.5 * np.pi * np.arange(half + 1) / half)  # Chebyshev points, from 0 to 1
@@ -180,7 +170,7 @@ def face_base(
     base, fitted = laid(face, ridge, path, at, direction, fit, mirror, reverse)
     strip = samples_of(base)
     if w is not None and (slim := narrowed(strip, fitted, w)) is not fitted:
-        base, fitted = replace(base, reach=(slim.arc_length, slim.border), kept={}, last={}, slim=True), slim
+        base, fitted = replace(base, reach=(slim.arc_length, slim.border), kept={}, slim=True), slim
         strip = samples_of(base)
     check_strip(base, strip, beyond)
     return base, fitted

@@ -135,7 +135,7 @@ def developed_path(host: Host, ridge: Stations, at: Floats, tangent: Floats) -> 
     Raises ValueError where the integration does not settle to 1e-8 of the width, as near a pole.
     """
     half, width = 0.5 * float(ridge.arc_length[-1]), float(np.median(ridge.width))
-    _, pu, pv = host.jet(at[None, 0], at[None, 1])[:3]
+    _, pu, pv = host.jet(at[None, 0], at[None, 1], 1)[:3]
     rate = host.parameters(tangent / np.linalg.norm(tangent), pu, pv)
     start, rates = np.repeat(at[None], 2, axis=0), np.concatenate([rate, -rate])
     # curvature has kinks at the stations: steps end there, or the method would lose its order
@@ -258,7 +258,7 @@ def _by_arc_length(host: Host, t: Floats, spline: CubicSpline) -> dict[str, Floa
     nodes, weights = np.polynomial.legendre.leggauss(5)
     inner = t[:-1, None] + 0.5 * np.diff(t)[:, None] * (1 + nodes)
     at, rate = spline(inner), spline(inner, 1)
-    _, pu, pv = host.jet(at[..., 0], at[..., 1])[:3]
+    _, pu, pv = host.jet(at[..., 0], at[..., 1], 1)[:3]
     speed = np.linalg.norm(rate[..., :1] * pu + rate[..., 1:] * pv, axis=-1)
     s = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (speed @ weights))])
     x, rate, bend = (spline(t, i) for i in range(3))
@@ -289,7 +289,7 @@ def _shift(host: Host, before: dict[str, Floats], after: dict[str, Floats]) -> N
 def _check_corner(host: Host, before: dict[str, Floats], after: dict[str, Floats]) -> None:
     directions = []
     for piece, i in ((before, -1), (after, 0)):
-        p, pu, pv = (a[0] for a in host.jet(piece["x"][[i], 0], piece["x"][[i], 1])[:3])
+        p, pu, pv = (a[0] for a in host.jet(piece["x"][[i], 0], piece["x"][[i], 1], 1)[:3])
         directions.append(piece["rate"][i, 0] * pu + piece["rate"][i, 1] * pv)
     turn = float(np.linalg.norm(directions[1] - directions[0]))
     if turn > CORNER:

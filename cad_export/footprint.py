@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepTools import BRepTools
-from OCP.Geom import Geom_Surface
+from OCP.Geom import Geom_BSplineCurve, Geom_Surface
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.GeomAbs import (
     GeomAbs_Cone,
@@ -25,15 +25,16 @@ from OCP.GeomAbs import (
     GeomAbs_Torus,
 )
 from OCP.GeomAdaptor import GeomAdaptor_Surface
-from OCP.GeomAPI import GeomAPI
-from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
+from OCP.gp import gp_Ax3, gp_Pln, gp_Pnt
 from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 
+from cad_export import occt_arrays
 from cad_export.check import subshapes
-from cad_export.geometry import to_occt
-from ridgefeature.bspline import Curve, Surface, clamped_knots, greville, interpolate
+from cad_export.host_surface import Evaluator, elementary
+from ridgefeature.basis import Places, solved
+from ridgefeature.bspline import Curve, clamped_knots, greville
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +43,6 @@ _SPLIT = 2  # knot spans of a parameter curve for each one of its edge
 _KEPT_CURVES, _KEPT_HOSTS = 64, 8
 _HOSTS: OrderedDict[tuple[int, int], tuple[HostSurface, object]] = OrderedDict()
 """Host surfaces asked for lately, with the faces' own shapes, held so that their identity stays theirs."""
-_ACROSS = np.array([0.0, 0.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,10 @@ class HostSurface:
     @cached_property
     def _adaptor(self) -> GeomAdaptor_Surface:
         return GeomAdaptor_Surface(self.geometry)
+
+    @cached_property
+    def _jet(self) -> Evaluator | None:
+        return elementary(self._adaptor)
 
     @cached_property
     def plane(self) -> gp_Pln | None:
@@ -86,6 +90,8 @@ class HostSurface:
 
     def points(self, uv: Floats) -> Floats:
         """(n, 3) points of the surface at parameters (n, 2)."""
+        if self._jet:
+            return self._jet(uv[:, 0], uv[:, 1], 1)[0]
         return np.array([self._adaptor.Value(u, v).Coord() for u, v in uv.tolist()])
 
     def _on_plane(self, points: Floats) -> Floats:
@@ -159,20 +165,40 @@ def on_host(
 def _on_host(
     host: HostSurface, curve: Curve, span: tuple[float, float], start: Floats | None, forward: bool
 ) -> OnHost:
-    knots = _refined(curve.knots, curve.degree, span, _SPLIT)
-    sites = greville(knots, curve.degree)
-    uv = host.parameters(curve(sites))
+    to = _flattening(curve.knots.tobytes(), curve.degree, span)
+    uv = host.parameters(to.curve_at_sites(curve.poles))
     shift = np.zeros(2) if start is None else start - uv[0 if forward else -1]
     for k, period in enumerate(host.periods):
         if period:
             uv[:, k] += period * np.round(shift[k] / period)
-    poles = interpolate(knots, curve.degree, uv)
-    flat = Curve(poles, knots, curve.degree)
-    at = _refined(curve.knots, curve.degree, span, 4 * _SPLIT)[curve.degree : -curve.degree]
-    fine = flat(at)
-    off = np.linalg.norm(host.points(fine) - curve(at), axis=1)
+    flat = Curve(solved(to.flat_at_sites.matrix(len(uv)), uv), to.knots, curve.degree)
+    fine = to.flat_fine(flat.poles)
+    off = np.linalg.norm(host.points(fine) - to.curve_fine(curve.poles), axis=1)
     line = fine[::2]
     return OnHost(flat, line if forward else line[::-1], float(off.max()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Flattening:
+    """What the parameter curves of all curves with the same knots have in common.
+
+    knots: theirs. Places: the sites where they are interpolated, and fine ones between, for the distance.
+    """
+
+    knots: Floats
+    flat_at_sites: Places
+    curve_at_sites: Places
+    flat_fine: Places
+    curve_fine: Places
+
+
+@lru_cache(4)  # the ends of a ridge have the same knots at all its widths
+def _flattening(knots: bytes, degree: int, span: tuple[float, float]) -> _Flattening:
+    own = np.frombuffer(knots)
+    flat = _refined(own, degree, span, _SPLIT)
+    fine = _refined(own, degree, span, 4 * _SPLIT)[degree:-degree]
+    places = [Places.at(k, degree, t) for t in (greville(flat, degree), fine) for k in (flat, own)]
+    return _Flattening(flat, *places)
 
 
 def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:
@@ -185,19 +211,20 @@ def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) 
     return clamped_knots(np.interp(at, np.arange(len(breaks)), breaks), degree)
 
 
-def curve2d(curve: Curve) -> Geom2d_BSplineCurve:
-    """A plane curve, poles (n, 2), with the same poles and knots in OCCT; kept, as sliders ask again."""
-    return _curve2d(curve.poles.tobytes(), curve.knots.tobytes(), curve.degree)
+def occt_curve(curve: Curve) -> Geom_BSplineCurve | Geom2d_BSplineCurve:
+    """A curve, poles (n, 3) or (n, 2), with the same poles and knots in OCCT; kept, as sliders ask again."""
+    return _occt_curve(curve.poles.tobytes(), curve.poles.shape[1], curve.knots.tobytes(), curve.degree)
 
 
 @lru_cache(_KEPT_CURVES)
-def _curve2d(poles: bytes, knots: bytes, degree: int) -> Geom2d_BSplineCurve:
-    points = np.frombuffer(poles).reshape(-1, 1, 2)
-    flat = np.zeros((len(points), 2, 3))
-    flat[:, :, :2] = points
-    flat[:, 1, 2] = 1.0  # an iso-curve of a strip: curves need no array containers of their own
-    strip = to_occt(Surface(flat, np.frombuffer(knots), _ACROSS, degree, 1))
-    return GeomAPI.To2d_s(strip.VIso(0.0), gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)))
+def _occt_curve(
+    poles: bytes, dimension: int, knots: bytes, degree: int
+) -> Geom_BSplineCurve | Geom2d_BSplineCurve:
+    where = *occt_arrays.knots(knots), degree
+    points = np.frombuffer(poles).reshape(-1, dimension)
+    if dimension == 2:
+        return Geom2d_BSplineCurve(occt_arrays.points1_2d(points), *where)
+    return Geom_BSplineCurve(occt_arrays.points1(points), *where)
 
 
 def wires_of(face: TopoDS_Face) -> list[TopoDS_Wire]:

@@ -8,8 +8,9 @@ IntCurvesFace_ShapeIntersector). OCP only, no cadquery.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from weakref import WeakKeyDictionary
+from collections import deque
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from cad_export.face_base import FaceBase
 from cad_export.geometry import DEGENERATE
+from cad_export.host_surface import dot
 from cad_export.strip import places_along
 from ridgefeature.ridge import Ridge
 
@@ -30,8 +32,9 @@ _MOST_PLACES = 129  # along, for the base's curvature
 _MOST_LINES = 33  # along, for other faces
 _ETA = np.linspace(-0.5, 0.5, 17)
 _LINES = slice(4, 13, 4)  # which of them look for other faces: the crest and halfway to the feet
+_BESIDE = slice(4, 13, 8)  # the latter
 _ROOM = 0.98  # of a radius: nearer to it the surface's normals turn too fast for CAD
-_KEPT = 4
+_KEPT, _KEPT_PLACES = 4, 16
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,70 @@ class Headroom:
     engraved: Limit
 
 
-_KNOWN: WeakKeyDictionary[FaceBase, list[tuple[TopoDS_Shape, Ridge, Headroom]]] = WeakKeyDictionary()
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A base and the solid around it: what all ridges there have in common, and what was found for some."""
+
+    solid: TopoDS_Shape
+    base: FaceBase
+    found: list[tuple[Ridge, Headroom]] = field(default_factory=list)
+
+    @cached_property
+    def s(self) -> Floats:
+        """(n,) arc lengths that are looked at."""
+        return places_along(self.base)
+
+    @cached_property
+    def lines(self) -> NDArray[np.intp]:
+        """Those from which other faces are looked for."""
+        return _even(len(self.s), _MOST_LINES)
+
+    @cached_property
+    def near(self) -> float:
+        """Nearer than this it is the base's own face."""
+        return 1e-3 * float(self.base.breadth(np.array([0.5 * self.base.length]))[0])
+
+    @cached_property
+    def far(self) -> float:
+        """Beyond this there is nothing."""
+        box = Bnd_Box()
+        BRepBndLib.Add_s(self.solid, box, False)
+        return float(1.01 * box.SquareExtent() ** 0.5)
+
+    @cached_property
+    def faces(self) -> IntCurvesFace_ShapeIntersector:
+        """The solid's faces, to be met by lines."""
+        meeting = IntCurvesFace_ShapeIntersector()
+        meeting.Load(self.solid, DEGENERATE)
+        return meeting
+
+    @cached_property
+    def over_crest(self) -> Floats:
+        """(2, lines, 1) gaps over the path, where the crest is at all widths."""
+        return self.gaps(self.base.parameters(self.s[self.lines], np.zeros((len(self.lines), 1))))
+
+    def gaps(self, x: Floats) -> Floats:
+        """(2, ...) distances along the face's normals at parameters (..., 2) to the solid's next face.
+
+        Below and above; inf without one.
+        """
+        points, normals = self.base.host.frame(x[..., 0], x[..., 1])
+        faces, near, far = self.faces, self.near, self.far
+        gaps = []
+        for p, d in np.stack([points, normals], axis=-2).reshape(-1, 2, 3).tolist():
+            faces.Perform(gp_Lin(gp_Pnt(*p), gp_Dir(*d)), -far, far)
+            below = above = np.inf
+            for k in range(1, faces.NbPnt() + 1):
+                at = faces.WParameter(k)
+                if at > near:
+                    above = min(above, at)
+                elif at < -near:
+                    below = min(below, -at)
+            gaps.append((below, above))
+        return np.array(gaps).T.reshape(2, *x.shape[:-1])
+
+
+_PLACES: deque[_Place] = deque(maxlen=_KEPT_PLACES)
 
 
 def check_height(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge, h: float = 1.0) -> None:
@@ -80,13 +146,16 @@ def check_height(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge, h: float = 1
 
 
 def _known(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge) -> Headroom:
-    known = _KNOWN.setdefault(base, [])
-    for other, same, room in known:
-        if _alike(same, ridge) and other.IsSame(solid):
+    place = next((p for p in _PLACES if p.base is base and p.solid.IsSame(solid)), None)
+    if place is None:
+        place = _Place(solid, base)
+        _PLACES.append(place)
+    for same, room in place.found:
+        if _alike(same, ridge):
             return room
-    room = headroom(solid, base, ridge)
-    known.append((solid, ridge, room))
-    del known[:-_KEPT]
+    room = _headroom(place, ridge)
+    place.found.append((ridge, room))
+    del place.found[:-_KEPT]
     return room
 
 
@@ -97,14 +166,18 @@ def _alike(a: Ridge, b: Ridge) -> bool:
 
 def headroom(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge) -> Headroom:
     """The largest rates h of both signs; see check_height. On at most 129 by 17 places, 33 by 3 for faces."""
-    s = places_along(base)
+    return _headroom(_Place(solid, base), ridge)
+
+
+def _headroom(place: _Place, ridge: Ridge) -> Headroom:
+    s, base, lines = place.s, place.base, place.lines
     width, height = (np.interp(s, ridge.arc_length, x) for x in (ridge.width, ridge.height))
     x = base.parameters(s, width[:, None] * _ETA)
     few = _even(len(s), _MOST_PLACES)
     least, largest = _curvatures(base, x[few])
     rise = height[:, None] * ridge.section(_ETA)
-    lines = _even(len(s), _MOST_LINES)
-    below, above = _gaps(solid, base, x[lines][:, _LINES])
+    left, right = np.split(place.gaps(x[lines][:, _BESIDE]), 2, axis=2)
+    below, above = np.concatenate([left, place.over_crest, right], axis=2)
     limits = []
     for sign in (1.0, -1.0):
         towards = sign * rise[few]
@@ -132,28 +205,9 @@ def _curvatures(base: FaceBase, x: Floats) -> tuple[Floats, Floats]:
     """Principal curvatures (...) at parameters (..., 2), the lesser first; positive where normals meet."""
     _, pu, pv, puu, puv, pvv = base.host.jet(x[..., 0], x[..., 1])
     normal = base.host.normal(pu, pv)
-    e, f, g = ((a * b).sum(axis=-1) for a, b in ((pu, pu), (pu, pv), (pv, pv)))
-    ll, m, n = ((a * normal).sum(axis=-1) for a in (puu, puv, pvv))
+    e, f, g = dot(pu, pu), dot(pu, pv), dot(pv, pv)
+    ll, m, n = dot(puu, normal), dot(puv, normal), dot(pvv, normal)
     area = e * g - f * f
     mean = 0.5 * (e * n - 2 * f * m + g * ll) / area
     spread = np.sqrt(np.maximum(mean**2 - (ll * n - m * m) / area, 0.0))
     return mean - spread, mean + spread
-
-
-def _gaps(solid: TopoDS_Shape, base: FaceBase, x: Floats) -> tuple[Floats, Floats]:
-    """Distances along the face's normals to the solid's next face, below and above; inf without one."""
-    points, normals = base.host.frame(x[..., 0], x[..., 1])
-    box = Bnd_Box()
-    BRepBndLib.Add_s(solid, box, False)
-    far = 1.01 * box.SquareExtent() ** 0.5
-    near = 1e-3 * float(base.breadth(np.array([0.5 * base.length]))[0])
-    meeting = IntCurvesFace_ShapeIntersector()
-    meeting.Load(solid, DEGENERATE)
-    gaps = np.full((2, points[..., 0].size), np.inf)
-    for i, (p, d) in enumerate(np.stack([points, normals], axis=-2).reshape(-1, 2, 3).tolist()):
-        line = gp_Lin(gp_Pnt(*p), gp_Dir(*d))
-        meeting.Perform(line, -far, far)
-        hits = [meeting.WParameter(k) for k in range(1, meeting.NbPnt() + 1)]
-        gaps[0, i] = min((-at for at in hits if -at > near), default=np.inf)
-        gaps[1, i] = min((at for at in hits if at > near), default=np.inf)
-    return gaps[0].reshape(x.shape[:-1]), gaps[1].reshape(x.shape[:-1])

@@ -23,10 +23,11 @@ from OCP.TopoDS import (
 
 from cad_export.check import subshapes
 from cad_export.end_caps import Lift
-from cad_export.footprint import curve2d
+from cad_export.footprint import occt_curve
 from cad_export.geometry import DEGENERATE
 from cad_export.site import Line, Site
 from cad_export.surface_form import to_occt
+from ridgefeature.basis import Places
 from ridgefeature.bspline import Curve, greville
 
 Floats = NDArray[np.float64]
@@ -90,9 +91,10 @@ class Maker:
         """The border across, at the first (k = 0) or last (k = -1) u, in the order round the surface."""
         s, low = self.surface, line.curve
         u, (v0, v1) = s.domain
-        row, found = Curve(s.poles[k], s.knots_v, s.degree_v), self.site.lifts(k, self.h)
+        found = self.site.lifts(k, self.h)
         breaks = [v0, *(x for lift in found for x in lift.span), v1]
-        pairs = zip(row(breaks[1:-1]), low(breaks[1:-1]), strict=True)
+        between = Places.at(s.knots_v, s.degree_v, np.array(breaks[1:-1]))
+        pairs = zip(between(s.poles[k]), between(low.poles), strict=True)
         middle = [self.vertex(0.5 * (a + b), float(np.linalg.norm(a - b)) + DEGENERATE) for a, b in pairs]
         vertices = [ends[0], *middle, ends[1]]
         pcurve, space = Geom2d_Line(gp_Pnt2d(u[k], 0.0), gp_Dir2d(0, 1)), self.geometry.UIso(u[k])
@@ -185,7 +187,7 @@ class Maker:
         self.build.MakeFace(f, to_occt(lift.surface), DEGENERATE)
         rises = lift.rise.poles.sum() > 0
         top = np.column_stack([greville(lift.rise.knots, 3), lift.rise.poles[:, 0]])
-        self.build.UpdateEdge(piece.edge, curve2d(Curve(top, lift.rise.knots, 3)), f, DEGENERATE)
+        self.build.UpdateEdge(piece.edge, occt_curve(Curve(top, lift.rise.knots, 3)), f, DEGENERATE)
         self.build.UpdateEdge(foot, Geom2d_Line(gp_Pnt2d(0, 0), gp_Dir2d(1, 0)), f, DEGENERATE)
         for e in (piece.edge, foot):
             self.widen(e, 1.1 * lift.distance + DEGENERATE)

@@ -28,6 +28,7 @@ from cad_export.paste_history import Placement, remember
 from cad_export.site import Site
 from cad_export.strip import OffFaceError
 from ridgefeature.fitting import FITS
+from ridgefeature.on_base import surfaces_on
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import millimetres_per
 
@@ -96,16 +97,17 @@ class _Stand:
     face: TopoDS_Face
     base: FaceBase
     ridge: Ridge
-    sites: dict[float, Site] = field(default_factory=dict)
+    sites: dict[float, tuple[Ridge, Site]] = field(default_factory=dict)
 
-    def site(self, h: float, w: float) -> Site:
-        """The site for these rates: one for all h, since a surface is affine in its height."""
+    def site(self, h: float, w: float) -> tuple[Ridge, Site]:
+        """The ridge at rate w, and the site for all h, since a surface is affine in its height."""
         self.ridge.resized(h=h, w=w)  # refuses rates that are none
         if w not in self.sites:
-            surface, base = (self.ridge.resized(h=h, w=w).surface(self.base) for h in (1, 0))
+            ridge = self.ridge.resized(w=w)
+            surface, base = surfaces_on(self.base, ridge, ridge.section)
             # The border of the flanks stays at all widths, and with it what is left of the face.
-            like = next((site.like or site for site in self.sites.values()), None)
-            self.sites[w] = Site(self.face, surface, base, like=like)
+            like = next((site.like or site for _, site in self.sites.values()), None)
+            self.sites[w] = ridge, Site(self.face, surface, base, like=like)
             while len(self.sites) > _KEPT_WIDTHS:
                 self.sites.pop(next(iter(self.sites)))
         return self.sites[w]
@@ -174,8 +176,8 @@ def _stand(
 
 def _site(solid: TopoDS_Shape, stand: _Stand, h: float, w: float) -> Site:
     """The site for these rates, which the place has room for."""
-    site = stand.site(h, w)
-    check_height(solid, stand.base, stand.ridge.resized(w=w), h)
+    ridge, site = stand.site(h, w)
+    check_height(solid, stand.base, ridge, h)
     return site
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -157,12 +158,10 @@ def _again(solid: Any, step: _Paste, h: float | None, w: float | None, check: bo
     """One paste repeated at other rates."""
     record, place = step.record, step.place
     path = None if place["path"] is None else from_text(place["path"])
-    at = np.array(place["on_face"])
-    face = min(solid.Faces(), key=lambda f: f.distance(cq.Vertex.makeVertex(*at)))
     return paste(
         ridge_in(record),
         solid,
-        face=face,
+        face=_face_at(solid, tuple(place["on_face"])),
         path=path,
         at=place["at"],
         direction=place["direction"],
@@ -172,6 +171,12 @@ def _again(solid: Any, step: _Paste, h: float | None, w: float | None, check: bo
         name=record.name,
         **place["options"],
     )
+
+
+@lru_cache(_INNER.maxlen)
+def _face_at(solid: cq.Shape, at: tuple[float, float, float]) -> cq.Face:
+    """The face of a solid nearest to a point, kept as the solids are."""
+    return min(solid.Faces(), key=lambda face: face.distance(cq.Vertex.makeVertex(*at)))
 
 
 def _moved(solid: cq.Solid, record: Carried) -> cq.Solid:

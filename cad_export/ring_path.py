@@ -22,7 +22,7 @@ def closed_path(host: Host, path: FacePath, width: float) -> FacePath:
     need not. width: of the ridge.
     """
     gap, twist = path.x[-1] - path.x[0], path.rate[-1] - path.rate[0]
-    _, pu, pv = host.jet(path.x[:1, 0], path.x[:1, 1])[:3]
+    _, pu, pv = host.jet(path.x[:1, 0], path.x[:1, 1], 1)[:3]
     to_space = np.stack([pu[0], pv[0]])
     if np.linalg.norm(gap @ to_space) > _MEETS * width or np.linalg.norm(twist @ to_space) > _STRAIGHT_ON:
         return path

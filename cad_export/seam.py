@@ -20,7 +20,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from cad_export.certificate import Change
 from cad_export.check import subshapes
 from cad_export.crossings import Crossing, CutEdge, Stretch, crossings, cut_edges, outward, same_surface
-from cad_export.footprint import HostSurface, cross, curve2d, inside, on_host, surface_on, wires_of
+from cad_export.footprint import HostSurface, cross, inside, occt_curve, on_host, surface_on, wires_of
 from cad_export.geometry import DEGENERATE
 from cad_export.inset_edges import Maker, Piece
 from cad_export.regions import HalfEdge, half_edges, regions
@@ -51,7 +51,7 @@ class CutSite(Site):
         else:
             rounds = [[sides[0], self._end(-1), sides[1], self._end(0)]]
         return tuple(
-            Loop(tuple(Line(c, space, None, self._off(c), ahead) for c, space, _, ahead in parts), _NOWHERE)
+            Loop(tuple(Line(c, occt_curve(c), None, self._off(c), ahead) for c, _, ahead in parts), _NOWHERE)
             for parts in rounds
         )
 
@@ -216,7 +216,7 @@ def _half_on(part: Stretch, face: TopoDS_Face, at: Floats, site: Site) -> HalfEd
         raise OffFacesError(_LEAVES)
     where, build = TopLoc_Location(), BRep_Builder()
     raw = BRep_Tool.Surface_s(face, where)
-    flat = curve2d(replace(found.flat, poles=found.flat.poles + move))
+    flat = occt_curve(replace(found.flat, poles=found.flat.poles + move))
     off = max(found.distance, part.off)
     build.UpdateEdge(part.edge, flat, raw, where, 1.1 * off + DEGENERATE)
     for vertex in subshapes(part.edge, TopAbs_VERTEX):

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Geom import Geom_BSplineSurface, Geom_Curve
+from OCP.Geom import Geom_Curve
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face, TopoDS_Wire
@@ -18,9 +18,9 @@ from cad_export.end_caps import Lift, lifts
 from cad_export.footprint import (
     OnHost,
     cross,
-    curve2d,
     inside,
     meetings,
+    occt_curve,
     on_host,
     seams_of,
     segments_of,
@@ -28,7 +28,6 @@ from cad_export.footprint import (
     surface_on,
     wires_of,
 )
-from cad_export.surface_form import to_occt
 from cad_export.volume_by_height import VolumeByHeight
 from ridgefeature.bspline import Curve, Surface
 
@@ -104,8 +103,8 @@ class Site:
                 raise ValueError(
                     "base: expected the knots of the surface, got others; make both from one ridge"
                 )
-        gap = np.abs(self.surface.poles - self.base.poles)[:, [0, -1]].max()
-        if gap > 1e-9 * self.size:
+        gap = max(np.abs(self.surface.poles[:, k] - self.base.poles[:, k]).max() for k in (0, -1))
+        if gap > 1e-9 * self.base.size:
             raise ValueError(
                 f"base: expected borders of the surface, they are {gap:.3g} apart; make both from one ridge"
             )
@@ -155,19 +154,9 @@ class Site:
         return VolumeByHeight(self.surface, self.base)
 
     @cached_property
-    def size(self) -> float:
-        """Largest extent along an axis."""
-        return float(np.ptp(self.base.poles, axis=(0, 1)).max())
-
-    @cached_property
     def breadth(self) -> float:
         """Distance between the borders of the flanks, the largest."""
         return float(np.linalg.norm(self.base.poles[:, 0] - self.base.poles[:, -1], axis=1).max())
-
-    @cached_property
-    def low(self) -> Geom_BSplineSurface:
-        """The base in OCCT."""
-        return to_occt(self.base)
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:
@@ -176,15 +165,14 @@ class Site:
         Raises ValueError where it is off the face or winds round it.
         """
         host = surface_on(self.face)
-        sides, ends = (
-            (self._side(0), self._side(-1)),
-            () if self.base.closed[0] else (self._end(-1), self._end(0)),
-        )
-        rounds = [[side] for side in sides] if not ends else [[sides[0], ends[0], sides[1], ends[1]]]
+        sides = self._side(0), self._side(-1)
+        rounds = [[side] for side in sides]
+        if not self.base.closed[0]:
+            rounds = [[sides[0], self._end(-1), sides[1], self._end(0)]]
         made = []
         for parts in rounds:
             found: list[OnHost] = []
-            for curve, _, span, forward in parts:
+            for curve, span, forward in parts:
                 at = found[-1].polyline[-1] if found else None
                 found.append(on_host(host, curve, span, at, forward))
                 self._check_distance(found[-1].distance)
@@ -193,10 +181,12 @@ class Site:
                 raise SeamError("surface: expected a border that closes on the face, it winds round it")
             line = np.concatenate([f.polyline[:-1] for f in found])
             shift = self._shift(line, host.periods)
-            flats = [curve2d(replace(f.flat, poles=f.flat.poles + shift)) for f in found]
+            flats = [f.flat for f in found]
+            if shift.any():
+                flats = [replace(flat, poles=flat.poles + shift) for flat in flats]
             lines = (
-                Line(curve, space, flat, f.distance, forward)
-                for (curve, space, _, forward), flat, f in zip(parts, flats, found, strict=True)
+                Line(curve, occt_curve(curve), occt_curve(flat), f.distance, forward)
+                for (curve, _, forward), flat, f in zip(parts, flats, found, strict=True)
             )
             made.append(Loop(tuple(lines), line + shift))
         if self.like is None:
@@ -262,13 +252,11 @@ class Site:
 
     def _side(self, k: int) -> _Part:
         s = self.base
-        u, v = s.domain
-        return Curve(s.poles[:, k], s.knots_u, s.degree_u), self.low.VIso(v[k]), u, k == 0
+        return Curve(s.poles[:, k], s.knots_u, s.degree_u), s.domain[0], k == 0
 
     def _end(self, k: int) -> _Part:
         s = self.base
-        u, v = s.domain
-        return Curve(s.poles[k], s.knots_v, s.degree_v), self.low.UIso(u[k]), v, k != 0
+        return Curve(s.poles[k], s.knots_v, s.degree_v), s.domain[1], k != 0
 
     def _check_distance(self, distance: float) -> None:
         if not distance <= ON_HOST * self.breadth:
@@ -281,14 +269,20 @@ class Site:
         """Whole periods by which a loop is moved to lie among the face's own parameters."""
         if not any(periods):
             return np.zeros(2)
-        own = np.concatenate([segments for _, segments in self.own])
-        middle = 0.5 * (own.min(axis=(0, 1)) + own.max(axis=(0, 1)))
         centre = 0.5 * (line.min(axis=0) + line.max(axis=0))
         period = np.array(periods)
-        return period * np.round((middle - centre) / np.where(period > 0, period, np.inf))
+        return period * np.round((self._middle - centre) / np.where(period > 0, period, np.inf))
+
+    @cached_property
+    def _middle(self) -> Floats:
+        """(2,) the middle of the face's own parameters."""
+        if self.like is not None:
+            return self.like._middle
+        own = np.concatenate([segments for _, segments in self.own])
+        return np.asarray(0.5 * (own.min(axis=(0, 1)) + own.max(axis=(0, 1))))
 
 
-_Part = tuple[Curve, Geom_Curve, tuple[float, float], bool]
+_Part = tuple[Curve, tuple[float, float], bool]
 
 
 def _pieces_of(line: Floats) -> Floats:

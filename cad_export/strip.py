@@ -287,7 +287,7 @@ def longer_direction(host: Host, place: Floats) -> Floats:
     along_u = host.points(u0 + (u1 - u0) * t, place[1] + 0 * t)
     along_v = host.points(place[0] + 0 * t, v0 + (v1 - v0) * t)
     lengths = [np.linalg.norm(np.diff(p, axis=0), axis=1).sum() for p in (along_u, along_v)]
-    return host.jet(place[0], place[1])[1 if lengths[0] >= lengths[1] else 2]
+    return host.jet(place[0], place[1], 1)[1 if lengths[0] >= lengths[1] else 2]
 
 
 def _all(shape: TopoDS_Shape, kind: object) -> list[TopoDS_Shape]:

@@ -54,14 +54,14 @@ def _read(data: bytes) -> Geom_BSplineSurface:
 
 
 def _pole_by_pole(surface: Surface) -> Geom_BSplineSurface:
-    knots_u, counts_u = np.unique(surface.knots_u, return_counts=True)
-    knots_v, counts_v = np.unique(surface.knots_v, return_counts=True)
+    knots_u, counts_u = occt_arrays.knots(surface.knots_u.tobytes())
+    knots_v, counts_v = occt_arrays.knots(surface.knots_v.tobytes())
     return Geom_BSplineSurface(
         occt_arrays.points2(surface.poles),
-        occt_arrays.reals(knots_u),
-        occt_arrays.reals(knots_v),
-        occt_arrays.integers(counts_u),
-        occt_arrays.integers(counts_v),
+        knots_u,
+        knots_v,
+        counts_u,
+        counts_v,
         int(surface.degree_u),
         int(surface.degree_v),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -54,20 +53,21 @@ class VolumeByHeight:
         u, v = _nodes(base.knots_u.tobytes(), base.degree_u), _nodes(base.knots_v.tobytes(), base.degree_v)
         swept, limits = np.zeros(3), [(-np.inf, np.inf)]
         # span by span across, where the rise is not 0: else it adds nothing, and arrays fit the cache
-        raised = np.abs(rise).max(axis=(0, 2)) > 0
+        raised = np.abs(rise).max(axis=0).max(axis=1) > 0  # axis by axis ten times as fast
         spans = np.flatnonzero(raised[v.near].any(axis=1))
         first, last = (v.near[spans[0], 0], v.near[spans[-1], -1]) if spans.size else (0, 0)
         poles = np.stack([base.poles, rise])[:, :, first : last + 1].transpose(0, 3, 2, 1)
-        along = [u.values(poles, k) for k in (0, 1)]  # (base or rise, 3, v's poles, u's nodes)
+        along = u.values(poles)  # (value or rate, base or rise, 3, v's poles, u's nodes)
         for k in spans:
             near = slice(v.near[k, 0] - first, v.near[k, -1] + 1 - first)
             value, rate = v.basis[0][k], v.basis[1][k]
-            d = value @ along[0][1, :, near]  # (3, v's nodes, u's nodes), as all that follow
-            (fu, du), (fv, dv) = value @ along[1][:, :, near], rate @ along[0][:, :, near]
-            mixed = zip(_cross(fu, dv), _cross(du, fv), strict=True)
-            normals = _cross(fu, fv), [a + b for a, b in mixed], _cross(du, dv)
-            swept += [v.weights[k] @ _dot(d, n) @ u.weights.ravel() for n in normals]
-            limits.append(_limits(*(_dot(n, normals[0]) for n in normals)))
+            d = value @ along[0, 1, :, near]  # (3, v's nodes, u's nodes), as all that follow
+            normals = _crosses(value @ along[1, :, :, near], rate @ along[0, :, :, near])
+            normals[0, 1] += normals[1, 0]
+            by_power = normals[0, 0], normals[0, 1], normals[1, 1]  # of h
+            d *= v.weights[k][:, None] * u.weights.ravel()
+            swept += [np.vdot(d, n) for n in by_power]
+            limits.append(_limits(*(np.einsum("kvu,kvu->vu", normals[0, 0], n) for n in by_power)))
         lows, highs = zip(*limits, strict=True)
         return tuple((swept / (1, 2, 3)).tolist()), (float(max(lows)), float(min(highs)))
 
@@ -81,14 +81,14 @@ def volume_between(surface: Surface, base: Surface) -> float:
 
 def _limits(a: Floats, b: Floats, c: Floats) -> tuple[float, float]:
     """Between which h around 0 a + b h + c h^2 stays above 0, everywhere."""
-    if not (a > 0).all():
+    if not a.min() > 0:
         return 0.0, 0.0
     # The roots as 1 / h, so that none is lost where c is nearly 0: a x^2 + b x + c = 0.
     half = 0.5 * b
-    square = half * half - a * c
-    root = np.where(square >= 0, np.sqrt(np.abs(square)), -np.inf)  # none: neither highest nor lowest
-    highest, lowest = ((root - half) / a).max(), -((root + half) / a).max()
-    return (1 / lowest if lowest < 0 else -np.inf), (1 / highest if highest > 0 else np.inf)
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(half * half - a * c)  # NaN without any: neither highest nor lowest
+    highest, lowest = (float(np.fmax.reduce(x / a, axis=None)) for x in (root - half, root + half))
+    return (-1 / lowest if lowest > 0 else -np.inf), (1 / highest if highest > 0 else np.inf)
 
 
 def _advice(low: float, high: float) -> str:
@@ -111,11 +111,11 @@ class _Nodes:
     basis: tuple[Floats, Floats]
     weights: Floats
 
-    def values(self, poles: Floats, derivative: int = 0) -> Floats:
-        """Values (..., all nodes) of splines with the poles (..., n)."""
+    def values(self, poles: Floats) -> Floats:
+        """Values and derivatives (2, ..., all nodes) of splines with the poles (..., n)."""
         near = np.moveaxis(poles, -1, 0).reshape(poles.shape[-1], -1)[self.near]
-        values = np.matmul(self.basis[derivative], near).reshape(self.weights.size, -1)
-        return np.ascontiguousarray(values.T).reshape(*poles.shape[:-1], -1)
+        both = np.stack([np.matmul(basis, near).reshape(self.weights.size, -1).T for basis in self.basis])
+        return np.ascontiguousarray(both).reshape(2, *poles.shape[:-1], -1)
 
 
 @lru_cache(16)
@@ -131,11 +131,10 @@ def _nodes(knots: bytes, degree: int) -> _Nodes:
     return _Nodes(found[0][0][:: len(x), None] + np.arange(degree + 1), (value, rate), half * w)
 
 
-def _cross(a: Sequence[Floats] | Floats, b: Sequence[Floats] | Floats) -> list[Floats]:
-    """Cross product of coordinates (3, ...)."""
-    (ax, ay, az), (bx, by, bz) = a, b
-    return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
-
-
-def _dot(a: Sequence[Floats] | Floats, b: Sequence[Floats] | Floats) -> Floats:
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+def _crosses(a: Floats, b: Floats) -> Floats:
+    """Vector products of all a (n, 3, ...) with all b (m, 3, ...): (n, m, 3, ...)."""
+    made = np.empty((len(a), *b.shape))
+    for k, i, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[:, None, i], b[:, j], out=made[:, :, k])
+        made[:, :, k] -= a[:, None, j] * b[:, i]
+    return made

@@ -6,6 +6,8 @@ No compiled code here: what a CAD script imports must stay light and survive a m
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -30,8 +32,8 @@ def greville(knots: ArrayLike, degree: int) -> Floats:
     """Greville abscissae (n_poles,): the mean of `degree` consecutive knots for each pole."""
     k, _ = checked_knots(knots, degree)
     n = k.size - degree - 1
-    windows = np.lib.stride_tricks.sliding_window_view(k[1:-1], degree)
-    return np.clip(np.mean(windows, axis=1), k[degree], k[n])  # a mean of equal knots may round outwards
+    means = np.add.reduce([k[i : n + i] for i in range(1, degree + 1)]) / degree
+    return np.clip(means, k[degree], k[n])  # a mean of equal knots may round outwards
 
 
 def basis_matrix(knots: ArrayLike, degree: int, at: ArrayLike, derivative: int = 0) -> Floats:
@@ -43,10 +45,7 @@ def basis_matrix(knots: ArrayLike, degree: int, at: ArrayLike, derivative: int =
     t = np.atleast_1d(np.asarray(at, dtype=np.float64))
     if t.ndim != 1:
         raise ValueError(f"expected parameters of shape (m,), got {t.shape}; pass at.ravel()")
-    first, values = local_basis(k, degree, t, derivative)
-    matrix = np.zeros((t.size, k.size - degree - 1))
-    np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values, axis=1)
-    return matrix
+    return Places.at(k, degree, t, derivative).matrix(k.size - degree - 1)
 
 
 def interpolate(knots: ArrayLike, degree: int, values: ArrayLike) -> Floats:
@@ -62,9 +61,12 @@ def interpolate(knots: ArrayLike, degree: int, values: ArrayLike) -> Floats:
             f"expected {sites.size} values, one for each Greville abscissa, got shape {v.shape}; "
             "sample at greville(knots, degree)"
         )
-    matrix = basis_matrix(knots, degree, sites)
-    poles = np.linalg.solve(matrix, v.reshape(sites.size, -1))
-    return np.asarray(poles, dtype=np.float64).reshape(v.shape)
+    return solved(basis_matrix(knots, degree, sites), v.reshape(sites.size, -1)).reshape(v.shape)
+
+
+def solved(matrix: Floats, values: Floats) -> Floats:
+    """Poles (n, d) for values (n, d) at places, of which the matrix (n, n) has the basis functions."""
+    return np.asarray(np.linalg.solve(matrix, values), dtype=np.float64)
 
 
 def local_basis(
@@ -79,8 +81,8 @@ def local_basis(
         raise ValueError(f"expected a derivative order of 0 or more, got {derivative}")
     t, nan = _inside(knots, degree, at)
     n = knots.size - degree - 1
-    last = np.searchsorted(knots, knots[n], side="left") - 1  # the last span that is not empty
-    span = np.minimum(np.searchsorted(knots, t, side="right") - 1, last)
+    last = knots.searchsorted(knots[n], side="left") - 1  # the last span that is not empty
+    span = np.minimum(knots.searchsorted(t, side="right") - 1, last)
     near = knots[span + np.arange(1 - degree, degree + 1)[:, None]]
     behind, ahead = t - near[:degree], near[degree:] - t
     values = np.full((1, t.size), 1.0 if derivative <= degree else 0.0)
@@ -94,8 +96,36 @@ def local_basis(
         else:
             values[1:] = behind[degree - q :] * share
             values[:-1] += ahead[:q] * share
-    values[:, nan] = np.nan
+    if nan is not None:
+        values[:, nan] = np.nan
     return span - degree, np.ascontiguousarray(values.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Parameters (m,) at which curves of the same knots are evaluated, again and again.
+
+    near: the poles that bear on each, basis: how much; (m, degree + 1).
+    """
+
+    near: NDArray[np.intp]
+    basis: Floats
+
+    @staticmethod
+    def at(knots: Floats, degree: int, t: Floats, derivative: int = 0) -> Places:
+        """Parameters t (m,) on knots as checked_knots returns them; see local_basis."""
+        first, basis = local_basis(knots, degree, t, derivative)
+        return Places(first[:, None] + np.arange(degree + 1), basis)
+
+    def matrix(self, n: int) -> Floats:
+        """(m, n) basis functions of all n poles, dense."""
+        matrix = np.zeros((len(self.near), n))
+        np.put_along_axis(matrix, self.near, self.basis, axis=1)
+        return matrix
+
+    def __call__(self, poles: Floats) -> Floats:
+        """Points (m, d) of the curve with these poles (n, d)."""
+        return np.einsum("mi,mid->md", self.basis, poles[self.near])
 
 
 def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> tuple[Floats, int]:
@@ -120,12 +150,12 @@ def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> 
     return k, n
 
 
-def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Parameters clipped to the domain by no more than rounding, and which of them were NaN."""
+def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_] | None]:
+    """Parameters clipped to the domain by no more than rounding, and which of them were NaN, None if none."""
     low, high = knots[degree], knots[knots.size - degree - 1]
     slack = 1e-12 * max(high - low, abs(low), abs(high))
     if at.size and at.min() >= low - slack and at.max() <= high + slack:  # not for NaN
-        return np.clip(at, low, high), np.zeros(at.shape, dtype=np.bool_)
+        return at.clip(low, high), None
     nan = np.isnan(at)
     outside = (at < low - slack) | (at > high + slack)
     if outside.any():

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.basis import (
     Floats,
+    Places,
     basis_matrix,
     checked_knots,
     clamped_knots,
@@ -54,9 +55,8 @@ class Curve:
         Raises ValueError for parameters outside the domain.
         """
         at = np.asarray(t, dtype=np.float64)
-        first, basis = local_basis(self.knots, self.degree, at.ravel(), derivative)
-        near = self.poles[first[:, None] + np.arange(self.degree + 1)]
-        return np.einsum("mi,mid->md", basis, near).reshape(*at.shape, self.poles.shape[1])
+        places = Places.at(self.knots, self.degree, at.ravel(), derivative)
+        return places(self.poles).reshape(*at.shape, self.poles.shape[1])
 
     def arc_length(self, t0: ArrayLike | None = None, t1: ArrayLike | None = None) -> Any:
         """Arc length from t0 to t1 (broadcast; negative backwards), by default of the whole curve."""
@@ -143,10 +143,15 @@ class Surface:
         return _domain(self.knots_u, self.degree_u), _domain(self.knots_v, self.degree_v)
 
     @cached_property
+    def size(self) -> float:
+        """Largest extent of the poles along an axis."""
+        rows = np.ascontiguousarray(self.poles.reshape(-1, 3).T)  # as stored, 20 times as slow
+        return float(np.ptp(rows, axis=1).max())
+
+    @cached_property
     def closed(self) -> tuple[bool, bool]:
         """Whether the surface ends where it starts, along u and along v."""
-        p, size = self.poles, np.ptp(self.poles, axis=(0, 1)).max()
-        near = 1e-9 * size
+        p, near = self.poles, 1e-9 * self.size
         return bool(np.abs(p[0] - p[-1]).max() <= near), bool(np.abs(p[:, 0] - p[:, -1]).max() <= near)
 
     def __call__(self, u: ArrayLike, v: ArrayLike) -> Floats:

@@ -52,8 +52,10 @@ class _Layout:
     across: Array
     """(m, section's poles) from control values of a row to its values at the columns' sites."""
     columns_to_poles: Array
+    raised: slice
+    """The poles of a row that bear on nothing beyond the feet."""
     lift_to_poles: Array
-    """The same for what stands on the base; zero for all poles that bear on anything beyond the feet."""
+    """(raised, m): the same as columns_to_poles for what stands on the base, zero for all other poles."""
 
 
 # Kept beside the bases, not in them: a base need be no more than its protocol says.
@@ -72,17 +74,24 @@ def surface_on(base: Base, stations: Stations, section: Section) -> Surface:
     Raises ValueError where the base is none, its length is not the ridge's, it returns anything but finite
     arrays, or it is closed and the ridge's ends do not meet.
     """
+    return surfaces_on(base, stations, section)[0]
+
+
+def surfaces_on(base: Base, stations: Stations, section: Section) -> tuple[Surface, Surface]:
+    """The surface of a ridge on a base, and that of the same ridge with height 0; see surface_on."""
     _check(base, stations)
     layout = _kept_layout(base, stations, section)
     width, border, height = (layout.spread @ x for x in (stations.width, stations.border, stations.height))
     sideways, raised = row_controls(section, width, border, height, layout.flank)
     points, normals = _on(base, layout.s, sideways @ layout.across.T)
     lift = (raised @ layout.across.T)[..., None] * normals
-    columns = np.matmul(layout.columns_to_poles, points) + np.matmul(layout.lift_to_poles, lift)
-    poles = np.tensordot(layout.rows_to_poles, columns, 1)
+    flat = np.tensordot(layout.rows_to_poles, np.matmul(layout.columns_to_poles, points), 1)
+    poles = flat.copy()
+    poles[:, layout.raised] += np.tensordot(layout.rows_to_poles, np.matmul(layout.lift_to_poles, lift), 1)
     if base.closed:
-        poles[-1] = poles[0]
-    return Surface(poles, layout.knots_u, layout.knots_v, DEGREE, DEGREE)
+        poles[-1], flat[-1] = poles[0], flat[0]
+    knots = layout.knots_u, layout.knots_v
+    return Surface(poles, *knots, DEGREE, DEGREE), Surface(flat, *knots, DEGREE, DEGREE)
 
 
 def _check(base: Base, stations: Stations) -> None:
@@ -149,23 +158,24 @@ def _layout(base: Base, stations: Stations, section: Section, flank: float) -> _
         knots_v,
         basis_matrix(section_knots(section, flank), DEGREE, sites),
         np.asarray(np.linalg.inv(basis_matrix(knots_v, DEGREE, sites)), dtype=np.float64),
-        _lift_to_poles(knots_v, sites),
+        *_lift_to_poles(knots_v, sites),
     )
 
 
-def _lift_to_poles(knots: Array, sites: Array) -> Array:
-    """Linear map (n, n) from what stands on the base at the sites to poles, zero outside the feet.
+def _lift_to_poles(knots: Array, sites: Array) -> tuple[slice, Array]:
+    """The poles that bear on nothing beyond the feet, and the map to them from what stands on the base.
 
-    Least squares by the poles that bear on nothing beyond the feet: an interpolation would leave ripples on
-    the flanks, and these belong to the base.
+    Least squares by these poles alone: an interpolation would leave ripples on the flanks, and these belong
+    to the base.
     """
     slack = 1e-9
     within = (knots[: -DEGREE - 1] > -0.5 - slack) & (knots[DEGREE + 1 :] < 0.5 + slack)
     between = np.abs(sites) < 0.5
     basis = basis_matrix(knots, DEGREE, sites)
-    out = np.zeros_like(basis)
-    out[np.ix_(within, between)] = np.linalg.pinv(basis[np.ix_(between, within)])
-    return out
+    out = np.zeros((int(within.sum()), len(sites)))
+    out[:, between] = np.linalg.pinv(basis[np.ix_(between, within)])
+    first = int(np.argmax(within))
+    return slice(first, first + len(out)), out
 
 
 def _spread(k: int, n: int, closed: bool) -> Array:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import ridgefeature as rf
 from ridgefeature.base import Base, developed, geodesic_curvature, plane_base, registered_base
 from ridgefeature.fitting import joined, mirrored
+from ridgefeature.on_base import surfaces_on
 from ridgefeature.section import Section
 
 TURN = Rotation.from_rotvec([0.3, -0.8, 1.7]).as_matrix()
@@ -334,3 +335,12 @@ def test_a_mirrored_ridge_is_its_reflection_and_twice_itself():
     reflected = points - 2 * ((points - ridge.spine[i]) @ across)[..., None] * across
     np.testing.assert_allclose(mirror.surface().grid(50, 20)[:, ::-1], reflected, atol=1e-9)
     np.testing.assert_allclose(mirrored(mirror).surface().poles, ridge.surface().poles, atol=1e-10)
+
+
+def test_the_surface_and_its_base_come_as_they_do_one_by_one():
+    ridge = made_ridge(40.0, 41)
+    base = Cylinder(30.0, ridge.length)
+    surface, flat = surfaces_on(base, ridge, ridge.section)
+    assert np.array_equal(surface.poles, ridge.surface(base).poles)
+    assert np.array_equal(flat.poles, ridge.resized(h=0).surface(base).poles)
+    assert np.array_equal(surface.poles[:, [0, -1]], flat.poles[:, [0, -1]])

@@ -114,6 +114,18 @@ def test_a_wider_or_higher_ridge_on_the_same_base_has_its_own_limits():
         check_height(solid, base, ridge.resized(h=1.2), h=deep)
 
 
+@pytest.mark.parametrize("name", ["bore, around", "slot"])
+def test_another_width_on_a_known_place_has_the_limits_that_it_has_on_a_new_one(name):
+    solid, base, ridge, _ = stood(name)
+    check_height(solid, base, ridge, h=1e-3)
+    for w in (0.7, 1.2):
+        other = ridge.resized(w=w)
+        limit = headroom(solid, base, other).raised.rate
+        check_height(solid, base, other, h=limit * (1 - 1e-9))
+        with pytest.raises(ValueError, match="h: expected at most"):
+            check_height(solid, base, other, h=limit)
+
+
 def test_a_grooves_own_sign_counts():
     solid, base, ridge, _ = stood("plate")
     groove = ridge.resized(h=-1)
