@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 UNFOLDED = 0.3
 """What one goes along a flank's border for a step along the path must be this part of that, at least.
 
-At 0.15 the surface of a real ridge that hooks at its start crossed itself between two stations.
+Nearer to a fold, surfaces of ridges with uneven bends cross themselves between stations.
 """
 _AROUND = 3  # stations to either side that are narrowed alike
 _SPARE = 1.05

@@ -206,7 +206,7 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
     lengths = ("arc_length", "spine", "height", "width", "border")
     stds = ("height_std", "width_std", "half_height_width_std", "spine_std")
     scaled = {name: factor * getattr(ridge, name) for name in lengths + stds}
-    return replace(ridge, unit="mm", curvature=ridge.curvature / factor, **scaled)
+    return replace(ridge, unit="mm", curvature=ridge.curvature / factor, end_interval=None, **scaled)
 
 
 def _solid_of(host: Any) -> TopoDS_Shape:

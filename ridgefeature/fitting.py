@@ -42,6 +42,7 @@ def stretched(ridge: Ridge, length: float, fit: str = "length") -> Ridge:
         arc_length=np.linspace(0.0, goal, len(ridge.arc_length)),
         spine=ridge.spine[0] + rate * (ridge.spine - ridge.spine[0]),
         curvature=ridge.curvature / rate,
+        end_interval=None if ridge.end_interval is None else rate * ridge.end_interval,
         **changes,
     )
 
@@ -63,7 +64,7 @@ def _trimmed(ridge: Ridge, length: float) -> Ridge:
     for name in _STDS:
         std = np.interp(s, ridge.arc_length, getattr(ridge, name))
         at[name] = np.nan_to_num(std, nan=np.inf, posinf=np.inf)  # unknown ones are infinite
-    return replace(ridge, arc_length=s, closed=False, **at)
+    return replace(ridge, arc_length=s, closed=False, end_interval=None, **at)
 
 
 def mirrored(ridge: Ridge) -> Ridge:

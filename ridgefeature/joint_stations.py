@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.smoothing import basis_at
 from ridgefeature.stations import Stations, arc_lengths, border_of, interpolating_curve, meeting
-from ridgefeature.whole_ends import BEYOND, ends_of
+from ridgefeature.whole_ends import BEYOND, end_interval, ends_of
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,16 @@ _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
 
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """Stations of a ridge fitted as a whole, and the fit; None where there are too few points for one."""
+
+    stations: Stations
+    joint: Joint | None = None
+    end_interval: Array | None = None
+    """(2, 2) as in Ridge."""
+
+
 def refitted(
     grid: Grid,
     stations: Stations,
@@ -39,25 +49,25 @@ def refitted(
     closed: bool,
     open_ends: tuple[bool, bool],
     settings: Settings,
-) -> tuple[Stations, Joint | None]:
-    """The stations fitted again as a whole; as they were, and None, where there are too few points.
+) -> Refit:
+    """The stations fitted again as a whole; as they were where there are too few points.
 
     open_ends: which ends may move, further out or back.
     """
     flat = settings.flat
     first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:
-        return stations, None
+        return Refit(stations)
     if not stations.curvature.any() and first.bent < _BENT:
         flat = True
         first = first.without(C)
-    laid = stations_of(first, len(stations.arc_length), settings)
+    laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
-        laid = _between_ends(grid, laid, first, open_ends, settings, flat)
+        laid, intervals = _between_ends(grid, laid, first, open_ends, settings, flat)
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first.smooth.weights, flat)
     if joint is None:
-        return laid, first
-    return stations_of(joint, len(laid.arc_length), settings), joint
+        return Refit(laid, first, intervals)
+    return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals)
 
 
 def _fit(
@@ -78,20 +88,25 @@ def _between_ends(
     open_ends: tuple[bool, bool],
     settings: Settings,
     flat: bool,
-) -> Stations:
-    """The stations between the ends that all points along the path tell."""
+) -> tuple[Stations, Array | None]:
+    """The stations between the ends that all points along the path tell, and these ends' intervals."""
     length = float(stations.arc_length[-1])
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
     fixed = replace(settings, section="bell")  # kept as it is
     wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
-        return stations
+        return stations, None
     start, end = ends_of(wide, 0.0, length, open_ends)
-    if (start, end) == (0.0, length) or end - start < _SHORTEST * float(np.median(stations.width)):
-        return stations
+    if end - start < _SHORTEST * float(np.median(stations.width)):
+        return stations, None
+    intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start
+    intervals[~np.array(open_ends)] = np.nan
+    intervals.setflags(write=False)
+    if (start, end) == (0.0, length):
+        return stations, intervals
     count = int(np.clip(round((end - start) / length * (len(stations.arc_length) - 1)) + 1, 13, 401))
-    return stations_of(wide, count, settings, (start, end))
+    return stations_of(wide, count, settings, (start, end)), intervals
 
 
 def _sound(joint: Joint) -> bool:

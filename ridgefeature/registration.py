@@ -74,17 +74,19 @@ def register(
         _track(full.thinned(_ROUGH_POINTS), full, pick, extent, hints, settings, progress), pick, hints
     )
     templates = _with_distances(track.templates, grid)
-    stations, section = lay_out(templates, settings, track.closed), templates[0].section
+    stations, section, intervals = lay_out(templates, settings, track.closed), templates[0].section, None
     if settings.measure == "residual":
         ends = not track.stop[0].startswith(GOES_ON), not track.stop[1].startswith(GOES_ON)
-        stations, joint = refitted(grid, stations, section, track.closed, ends, settings)
-        section = section if joint is None else joint.section
+        found = refitted(grid, stations, section, track.closed, ends, settings)
+        stations, intervals = found.stations, found.end_interval
+        section = section if found.joint is None else found.joint.section
     return Ridge(
         **vars(stations),
         section=section,
         templates=templates,
         stop=track.stop,
         closed=track.closed,
+        end_interval=intervals,
         unit=scan.unit,
         pick=pick,
         settings=settings,

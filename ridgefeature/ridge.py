@@ -33,7 +33,8 @@ class Ridge(Stations):
     `height` is the apex over the base; `width` the distance between the feet, where the section meets the
     base; `half_height_width` the full width at half height. The `_std` are one standard deviation. `closed`
     tells whether the ridge is a ring, whose last station is the first again; `stop` why each end stopped, in
-    words, of a ring "closed".
+    words, of a ring "closed". `end_interval` (2, 2): arc lengths between which each end is, to 95 %; below 0
+    or above the length where it may lie further out; NaN where it was not looked for, None of a ring.
     """
 
     section: Section
@@ -44,6 +45,7 @@ class Ridge(Stations):
     pick: Array = field(default_factory=lambda: np.zeros(3))
     settings: Settings = field(default_factory=Settings)
     source: Source | None = None
+    end_interval: Array | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

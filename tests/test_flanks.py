@@ -1,19 +1,14 @@
 """Flanks that would fold are narrowed; what is needed for the feet stays."""
 
-from dataclasses import fields, replace
-
 import cadquery as cq
 import numpy as np
 import pytest
 from made_ridges import made_ridge
-from matplotlib.cbook import get_sample_data
 
 import cad_export as cx
-import ridgefeature as rf
 from cad_export.face_base import face_base
 from cad_export.flanks import UNFOLDED
 from ridgefeature.merge import LEAST_BORDER
-from ridgefeature.stations import Stations
 
 STRAIGHT = made_ridge(40.0, 41)
 
@@ -71,28 +66,3 @@ def test_only_near_the_bend_and_alike_on_a_turned_face():
     np.testing.assert_allclose(fitted.border, turned.border, rtol=1e-9)
     assert fitted.border.min() == pytest.approx((1 - UNFOLDED) / 0.17, rel=0.03)
     assert fitted.border.max() == 6.0
-
-
-def mountain() -> rf.Ridge:
-    """The start of a mountain ridge, which hooks (radius 1.2 w), at 1 : 50,000."""
-    with get_sample_data("jacksboro_fault_dem.npz") as file:
-        z = file["elevation"].astype(np.float64)
-    row, column = np.indices(z.shape)
-    points = np.column_stack([74.5 * column.ravel(), 92.5 * (len(z) - 1 - row).ravel(), z.ravel()])
-    found = rf.register(points, at=(17429, 19603, 518))
-    rest = {f.name: getattr(found, f.name)[4:] for f in fields(Stations)}
-    rest["arc_length"] = rest["arc_length"] - rest["arc_length"][0]
-    return replace(found, **rest).stretched(5000.0, "trim").stretched(100.0, "scale")
-
-
-def test_a_real_ridge_that_hooks_at_its_start_does_not_cross_itself():
-    cylinder = cq.Workplane().cylinder(300, 70)
-    solid = cx.paste(
-        mountain(),
-        cylinder.val(),
-        face=cylinder.faces("%CYLINDER").val(),
-        at=(0, -70, 0),
-        direction=(0, 0, 1),
-        h=0.25,
-    )  # checked in full
-    assert solid.Volume() > cylinder.val().Volume()

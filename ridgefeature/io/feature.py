@@ -38,6 +38,7 @@ def to_document(ridge: Ridge) -> dict[str, Any]:
         "settings": asdict(ridge.settings),
         "closed": ridge.closed,
         "stop": list(ridge.stop),
+        "end_interval": None if ridge.end_interval is None else _plain(ridge.end_interval),
         "section": {"name": ridge.section.name, "coefficients": ridge.section.coefficients.tolist()},
         "stations": _values(ridge, fields(Stations), () if _is_curved(ridge) else _OF_CURVED),
         "templates": [
@@ -81,6 +82,7 @@ def from_document(document: Any) -> Ridge:
             templates=tuple(_template(t, section, without) for t in document["templates"]),
             stop=(str(document["stop"][0]), str(document["stop"][1])),
             closed=bool(document["closed"]),
+            end_interval=None if document["end_interval"] is None else _array(document["end_interval"]),
             unit=str(document["unit"]),
             pick=_array(document["pick"]),
             settings=Settings(**document["settings"]),
@@ -193,6 +195,8 @@ def _template(document: dict[str, Any], section: Section, without: Container[str
 def _check_shapes(ridge: Ridge) -> None:
     if not ridge.templates:
         raise ValueError("expected a feature with templates, got none; save the feature again")
+    if ridge.end_interval is not None and ridge.end_interval.shape != (2, 2):
+        raise ValueError(f"expected end_interval of shape (2, 2), got {ridge.end_interval.shape}; save again")
     k = ridge.arc_length.shape
     for f in fields(Stations):
         want = (*k, 3) if f.name in ("spine", "tangent", "normal") else k
