@@ -18,6 +18,8 @@ from ridgefeature.smoothing import Smooth, basis_at, smoothest
 Array = NDArray[np.float64]
 
 _ROUNDS = 4
+_WITHOUT_SHAPING = 1
+"""Round, from 0, that is the last one where the section stays as it is."""
 _FIRST_MIXTURE, _NEXT_MIXTURE = 15, 3
 MOST_POINTS, SOME_POINTS = 300_000, 20_000
 """As many are looked at in the last round, and before it."""
@@ -117,8 +119,8 @@ def fit_whole(
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
-    weights (6,): of the penalties of an earlier fit, to begin with. rounds: of which the last does not change
-    the section any more. flat: the base stays as curved across as the path has it. most: about as many
+    weights (6,): of the penalties of an earlier fit, to begin with. rounds: at most, of which the last does
+    not change the section any more. flat: the base stays as curved across as the path has it. most: about as many
     points are looked at.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
@@ -135,7 +137,7 @@ def fit_whole(
     noise, inflation = _first_noise(some, terms, section, h, w), 1.0
     shaping = settings.section in ("auto", "learned")
     for n in range(rounds):
-        last = n == rounds - 1
+        last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         matrix, goal, noise, gain = _linearised(points if last else some, terms, section, noise, _EXACT * h)
         if not np.isfinite(matrix).all() or not np.isfinite(gain):
             return None
@@ -153,6 +155,8 @@ def fit_whole(
         if shaping and not last:
             new, terms = _shaped(some, terms, section, noise, inflation)
             shaping, section = new is not section, new
+        if last:
+            break
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
     shape = section_std(some, terms, section, noise.told, inflation)
     return Joint(path, smooth, terms, section, matrix, goal, counts.astype(float), noise, inflation, shape)
@@ -196,7 +200,8 @@ def _shaped(
 
 def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> Noise:
     """The noise as some of the points tell it."""
-    distances = offsets(points[:: 1 + len(points) // _ENOUGH], terms, section.table)
+    points = points[:: 1 + len(points) // _ENOUGH]
+    distances = offsets(points, terms, section.table)
     scale = max(1.4826 * float(np.median(np.abs(distances))), _EXACT * h)
     span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
     scale, strays, density = mixture(distances, scale, _SOME_STRAYS, span, _EXACT * h, _FIRST_MIXTURE)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 ORDERS = (3, 2, 1, 3, 2, 2)
 """Order of the differences that are kept small, of each term: offsets follow a smooth curvature."""
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
