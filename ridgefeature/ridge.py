@@ -34,7 +34,7 @@ class Ridge(Stations):
     base; `half_height_width` the full width at half height. The `_std` are one standard deviation. `closed`
     tells whether the ridge is a ring, whose last station is the first again; `stop` why each end stopped, in
     words, of a ring "closed". `end_interval` (2, 2): arc lengths between which each end is, to 95 %; below 0
-    or above the length where it may lie further out; NaN where it was not looked for, None of a ring.
+    or above the length where it may lie further out; NaN where it was not looked for, None if neither was.
     """
 
     section: Section
