@@ -120,8 +120,8 @@ def fit_whole(
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     weights (6,): of the penalties of an earlier fit, to begin with. rounds: at most, of which the last does
-    not change the section any more. flat: the base stays as curved across as the path has it. most: about as many
-    points are looked at.
+    not change the section any more. flat: the base stays as curved across as the path has it. most: about
+    as many points are looked at.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
     if len(points) < _FEWEST:
