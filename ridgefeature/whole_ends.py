@@ -121,34 +121,40 @@ def end_interval(joint: Joint, place: float, outwards: int) -> tuple[float, floa
     before it stops being more likely than none. A ridge that has nearly faded may go on as long as the points
     of one width show anything.
     """
-    path = joint.path
-    at, end = outwards * path.at[::outwards], outwards * place
-    matrix, goal = joint.matrix[::outwards], joint.goal[::outwards]
-    terms = joint.terms[::outwards]
-    terms = 0.5 * (terms[1:] + terms[:-1])
-    middle = 0.5 * (at[1:] + at[:-1])
-    local = float(path.width[::outwards][np.argmin(np.abs(at - end))])
-    from_end = (middle - end) / local
-    before = (from_end > -_BEFORE[0]) & (from_end < -_BEFORE[1])
-    near = np.flatnonzero((from_end > -_BEFORE[0]) & (from_end < BEYOND))
+    at, end = outwards * joint.path.at[::outwards], outwards * place
+    local = float(joint.path.width[::outwards][np.argmin(np.abs(at - end))])
+    from_end = (0.5 * (at[1:] + at[:-1]) - end) / local
     slack = _SLACK * local
     low, high = end - slack, end + slack
-    if before.sum() >= 3:
-        slope, level = np.polyfit(from_end[before], terms[before, H], 1)
-        sign = 1.0 if np.median(terms[before, H]) > 0 else -1.0
+    known = (from_end > -_BEFORE[0]) & (from_end < -_BEFORE[1])
+    if known.sum() >= 3:
+        terms = joint.terms[::outwards]
+        terms = 0.5 * (terms[1:] + terms[:-1])
+        slope, level = np.polyfit(from_end[known], terms[known, H], 1)
+        sign = np.sign(np.median(terms[known, H]))
         height = sign * np.maximum(sign * (level + slope * from_end), 0.0)
-        rest = [A, B, C, E, W]
-        pull = goal[:, H] - (matrix[:, H, rest] * terms[:, rest]).sum(axis=1)
-        gain = height * (2.0 * pull - height * matrix[:, H, H])
-        total = np.concatenate([[0.0], np.cumsum(gain[near])])
+        near = np.flatnonzero((from_end > -_BEFORE[0]) & (from_end < BEYOND))
+        gain = _gain(joint.matrix[::outwards][near], joint.goal[::outwards][near], terms[near], height[near])
+        total = np.concatenate([[0.0], np.cumsum(gain)])
         likely = at[near[0] : near[-1] + 2][total > total.max() - _LIKELY]
         low, high = min(likely[0], end) - slack, max(likely[-1], end) + slack
-        usual = float(np.median(np.abs(joint.terms[:, H])))
-        if abs(level) < _FADED * usual:
-            one = min(NODES_A_WIDTH, len(path.at) - 2)
-            shown = evidence(joint, one)[0][::outwards]
-            k = max(int(np.searchsorted(at, end)) - one // 2, 0)
-            while k < len(shown) - 1 and shown[k] > _ANYTHING:
-                k += 1
-            low, high = low - _FADING * local, max(high, float(at[k + one // 2]) + slack)
+        if abs(level) < _FADED * float(np.median(np.abs(joint.terms[:, H]))):
+            low, high = low - _FADING * local, max(high, _last_shown(joint, at, end, outwards) + slack)
     return (low, high) if outwards > 0 else (-high, -low)
+
+
+def _gain(matrix: Array, goal: Array, terms: Array, height: Array) -> Array:
+    """Twice the log likelihood ratio (n,) of heights (n,) against none, all else as in terms (n, 6)."""
+    rest = [A, B, C, E, W]
+    pull = goal[:, H] - (matrix[:, H, rest] * terms[:, rest]).sum(axis=1)
+    return np.asarray(height * (2.0 * pull - height * matrix[:, H, H]))
+
+
+def _last_shown(joint: Joint, at: Array, end: float, outwards: int) -> float:
+    """The middle of the last of the windows from an end on whose points show any ridge."""
+    one = min(NODES_A_WIDTH, len(at) - 2)
+    shown = evidence(joint, one)[0][::outwards]
+    k = max(int(np.searchsorted(at, end)) - one // 2, 0)
+    while k < len(shown) - 1 and shown[k] > _ANYTHING:
+        k += 1
+    return float(at[k + one // 2])
