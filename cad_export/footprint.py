@@ -258,42 +258,6 @@ def _is_spline(curve: BRepAdaptor_Curve2d) -> bool:
     return curve.GetType().name == "GeomAbs_BSplineCurve"
 
 
-def signed_area(loop: Floats) -> float:
-    """Area within a closed polyline (n, 2), positive counter-clockwise."""
-    x, y = (loop - loop.mean(axis=0)).T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-
-
-def inside(points: Floats, segments: Floats) -> NDArray[np.bool_]:
-    """Whether points (n, 2) lie within closed lines given as pieces (m, 2, 2): the even-odd rule."""
-    a, b = segments[None, :, 0], segments[None, :, 1]
-    p = points[:, None]
-    straddles = (a[..., 1] > p[..., 1]) != (b[..., 1] > p[..., 1])
-    rise = np.where(straddles, b[..., 1] - a[..., 1], 1.0)
-    x = a[..., 0] + (p[..., 1] - a[..., 1]) / rise * (b[..., 0] - a[..., 0])
-    return np.asarray(np.count_nonzero(straddles & (p[..., 0] < x), axis=1) % 2 == 1)
-
-
-def cross(a: Floats, b: Floats) -> bool:
-    """Whether any straight piece of a (n, 2, 2) meets one of b (m, 2, 2)."""
-    low, high = a.min(axis=(0, 1)), a.max(axis=(0, 1))
-    near = b[((b.max(axis=1) >= low) & (b.min(axis=1) <= high)).all(axis=1)]
-    return bool(meetings(a, near).any())
-
-
-def meetings(a: Floats, b: Floats) -> NDArray[np.bool_]:
-    """Which straight pieces of a (n, 2, 2) meet which of b (m, 2, 2): (n, m); parallel ones do not."""
-    p, r = a[:, None, 0], (a[:, 1] - a[:, 0])[:, None]
-    q, s = b[None, :, 0], (b[:, 1] - b[:, 0])[None]
-    d = q - p
-    det = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    safe = np.where(det == 0, np.nan, det)
-    t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / safe
-    u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / safe
-    with np.errstate(invalid="ignore"):
-        return np.asarray((t >= 0) & (t <= 1) & (u >= 0) & (u <= 1))
-
-
 def surface_on(face: TopoDS_Face) -> HostSurface:
     """The placed surface under a face; the same one for the same face."""
     tshape = face.TShape()
