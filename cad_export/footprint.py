@@ -33,7 +33,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 from cad_export import occt_arrays
 from cad_export.check import subshapes
 from cad_export.host_surface import Evaluator, elementary
-from ridgefeature.basis import Places, solved
+from ridgefeature.basis import Places, basis_matrix
 from ridgefeature.bspline import Curve, clamped_knots, greville
 
 Floats = NDArray[np.float64]
@@ -170,7 +170,7 @@ def _on_host(
     for k, period in enumerate(host.periods):
         if period:
             uv[:, k] += period * np.round(shift[k] / period)
-    flat = Curve(solved(to.flat_at_sites.matrix(len(uv)), uv), to.knots, curve.degree)
+    flat = Curve(to.flat_from_sites @ uv, to.knots, curve.degree)
     fine = to.flat_fine(flat.poles)
     off = np.linalg.norm(host.points(fine) - to.curve_fine(curve.poles), axis=1)
     line = fine[::2]
@@ -181,11 +181,12 @@ def _on_host(
 class _Flattening:
     """What the parameter curves of all curves with the same knots have in common.
 
-    knots: theirs. Places: the sites where they are interpolated, and fine ones between, for the distance.
+    knots: theirs. flat_from_sites: from values at the sites to their poles. Places: these sites on the curve,
+    and fine ones between, for the distance.
     """
 
     knots: Floats
-    flat_at_sites: Places
+    flat_from_sites: Floats
     curve_at_sites: Places
     flat_fine: Places
     curve_fine: Places
@@ -196,8 +197,10 @@ def _flattening(knots: bytes, degree: int, span: tuple[float, float]) -> _Flatte
     own = np.frombuffer(knots)
     flat = _refined(own, degree, span, _SPLIT)
     fine = _refined(own, degree, span, 4 * _SPLIT)[degree:-degree]
-    places = [Places.at(k, degree, t) for t in (greville(flat, degree), fine) for k in (flat, own)]
-    return _Flattening(flat, *places)
+    sites = greville(flat, degree)
+    inverse = np.asarray(np.linalg.inv(basis_matrix(flat, degree, sites)), dtype=np.float64)
+    places = ((own, sites), (flat, fine), (own, fine))
+    return _Flattening(flat, inverse, *(Places.at(k, degree, t) for k, t in places))
 
 
 def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:
