@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Check
 from OCP.BRepBndLib import BRepBndLib
@@ -20,6 +20,7 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.Geom import Geom_BSplineSurface
 from OCP.GeomAbs import GeomAbs_Line
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
@@ -120,8 +121,22 @@ def _cone(face: TopoDS_Face, point: gp_Pnt, accuracy: float) -> float:
     if accuracy != ROUGH:
         return float(BRepGProp_Vinert(smooth, edges, point, point, accuracy).Mass())
     if is_whole(face):
-        return float(BRepGProp_Vinert(smooth, point).Mass())
+        return float(BRepGProp_Vinert(BRepGProp_Face(_turned(face)), point).Mass())
     return float(BRepGProp_Vinert(smooth, edges, point).Mass())
+
+
+def _turned(face: TopoDS_Face) -> TopoDS_Face:
+    """A whole face's surface and its outside, with the parameter that has more poles as v.
+
+    OCCT integrates with u innermost and works out a patch anew at every change of span.
+    """
+    surface = BRep_Tool.Surface_s(face)
+    if not isinstance(surface, Geom_BSplineSurface) or surface.NbUPoles() <= surface.NbVPoles():
+        return face
+    turned, made = surface.Copy(), TopoDS_Face()
+    turned.ExchangeUV()  # and with it the normal's sense
+    BRep_Builder().MakeFace(made, turned, BRep_Tool.Tolerance_s(face))
+    return made if face.Orientation() == TopAbs_REVERSED else TopoDS.Face_s(made.Reversed())
 
 
 def is_whole(face: TopoDS_Face) -> bool:

@@ -19,6 +19,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Ve
 from cad_export import occt_arrays
 from cad_export.check import subshapes
 from cad_export.footprint import HostSurface, surface_on
+from cad_export.polylines import polyline_meetings
 from cad_export.site import SeamError
 from ridgefeature.bspline import Curve
 
@@ -233,7 +234,7 @@ def _meetings(
     for k, (t, uv) in enumerate(lines):
         turns = [_turns(uv[:, i], cut[:, i], p) for i, p in enumerate(periods)]
         for move in ((a, b) for a in turns[0] for b in turns[1]):
-            for m, x, n, y in _polyline_meetings(uv, cut + np.multiply(move, periods)):
+            for m, x, n, y in polyline_meetings(uv, cut + np.multiply(move, periods)):
                 found.append((k, float(t[m] + x * (t[m + 1] - t[m])), n + y))
     return found
 
@@ -245,20 +246,6 @@ def _turns(line: Floats, cut: Floats, period: float) -> range:
     slack = 1e-6 * period
     least, most = (line.min() - cut.max() - slack) / period, (line.max() - cut.min() + slack) / period
     return range(int(np.ceil(least)), int(np.floor(most)) + 1)
-
-
-def _polyline_meetings(a: Floats, b: Floats) -> list[tuple[int, float, int, float]]:
-    """Segments of two polylines that meet, and how far along each, 0 to 1; ends count, by a small slack."""
-    p, r = a[:-1, None], np.diff(a, axis=0)[:, None]
-    q, s = b[None, :-1], np.diff(b, axis=0)[None]
-    d = q - p
-    det = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    safe = np.where(det == 0, np.nan, det)
-    x = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / safe
-    y = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / safe
-    with np.errstate(invalid="ignore"):
-        meet = (np.abs(x - 0.5) <= 0.5 + 1e-6) & (np.abs(y - 0.5) <= 0.5 + 1e-6)
-    return [(int(m), float(x[m, n]), int(n), float(y[m, n])) for m, n in np.argwhere(meet)]
 
 
 def _met(

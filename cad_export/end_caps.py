@@ -120,12 +120,12 @@ def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:
     breaks = np.concatenate([[a], inner[(inner > a) & (inner < b)], [b]])
     knots, fine = clamped_knots(breaks, 3), clamped_knots(_halved(breaks, 4), 3)
     t, sites, rough = _halved(fine[3:-3], 3), greville(fine, 3), greville(knots, 3)
-    parts = len(t), len(t) + len(sites)
-    both = Curve(np.hstack([base.poles, gap.poles]), base.knots, base.degree)
-    (low, apart), (_, gaps), (feet, _) = (
-        np.split(points, 2, axis=1) for points in np.split(both(np.concatenate([t, sites, rough])), parts)
-    )
-    at_t, at_sites, at_rough = np.split(basis_matrix(knots, 3, np.concatenate([t, sites, rough])), parts)
+    at_first, then, last = slice(len(t)), slice(len(t), len(t) + len(sites)), slice(-len(rough), None)
+    places = np.concatenate([t, sites, rough])
+    points = Places.at(base.knots, base.degree, places)(np.hstack([base.poles, gap.poles]))
+    low, feet, apart, gaps = points[at_first, :3], points[last, :3], points[at_first, 3:], points[then, 3:]
+    basis = basis_matrix(knots, 3, places)
+    at_t, at_sites, at_rough = basis[at_first], basis[then], basis[last]
     mean = apart[np.argmax((apart**2).sum(axis=1))]
     size = np.linalg.norm(apart, axis=1, keepdims=True) * np.sign(apart @ mean)[:, None]
     up = np.linalg.lstsq(at_t * size, apart, rcond=1e-9)[0]
@@ -133,9 +133,9 @@ def _lift(gap: Curve, base: Curve, a: float, b: float) -> Lift:
     reach = np.array([min(0.0, 1.25 * size.min()), max(0.0, 1.25 * size.max())])
     along = at_sites @ up
     heights = (gaps * along).sum(1, keepdims=True) / (along**2).sum(1, keepdims=True)
-    fine_at_t, fine_at_sites = np.split(basis_matrix(fine, 3, np.concatenate([t, sites])), parts[:1])
-    rise = Curve(solved(fine_at_sites, heights), fine, 3)
-    off = np.linalg.norm((at_t @ up) * (fine_at_t @ rise.poles) - apart, axis=1).max()
+    basis = basis_matrix(fine, 3, places[: then.stop])
+    rise = Curve(solved(basis[then], heights), fine, 3)
+    off = np.linalg.norm((at_t @ up) * (basis[at_first] @ rise.poles) - apart, axis=1).max()
     off = max(float(off), float(np.linalg.norm(low - at_t @ foot, axis=1).max()))
     return Lift((a, b), knots, foot, up, reach, rise, off)
 

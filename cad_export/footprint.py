@@ -33,12 +33,11 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Wire
 from cad_export import occt_arrays
 from cad_export.check import subshapes
 from cad_export.host_surface import Evaluator, elementary
-from ridgefeature.basis import Places, solved
+from ridgefeature.basis import Places, basis_matrix
 from ridgefeature.bspline import Curve, clamped_knots, greville
 
 Floats = NDArray[np.float64]
 
-_PARALLEL = 1e-12  # sine of the angle between pieces of one straight line, by rounding
 _SPLIT = 2  # knot spans of a parameter curve for each one of its edge
 _KEPT_CURVES, _KEPT_HOSTS = 64, 8
 _HOSTS: OrderedDict[tuple[int, int], tuple[HostSurface, object]] = OrderedDict()
@@ -171,7 +170,7 @@ def _on_host(
     for k, period in enumerate(host.periods):
         if period:
             uv[:, k] += period * np.round(shift[k] / period)
-    flat = Curve(solved(to.flat_at_sites.matrix(len(uv)), uv), to.knots, curve.degree)
+    flat = Curve(to.flat_from_sites @ uv, to.knots, curve.degree)
     fine = to.flat_fine(flat.poles)
     off = np.linalg.norm(host.points(fine) - to.curve_fine(curve.poles), axis=1)
     line = fine[::2]
@@ -182,11 +181,12 @@ def _on_host(
 class _Flattening:
     """What the parameter curves of all curves with the same knots have in common.
 
-    knots: theirs. Places: the sites where they are interpolated, and fine ones between, for the distance.
+    knots: theirs. flat_from_sites: from values at the sites to their poles. Places: these sites on the curve,
+    and fine ones between, for the distance.
     """
 
     knots: Floats
-    flat_at_sites: Places
+    flat_from_sites: Floats
     curve_at_sites: Places
     flat_fine: Places
     curve_fine: Places
@@ -197,8 +197,10 @@ def _flattening(knots: bytes, degree: int, span: tuple[float, float]) -> _Flatte
     own = np.frombuffer(knots)
     flat = _refined(own, degree, span, _SPLIT)
     fine = _refined(own, degree, span, 4 * _SPLIT)[degree:-degree]
-    places = [Places.at(k, degree, t) for t in (greville(flat, degree), fine) for k in (flat, own)]
-    return _Flattening(flat, *places)
+    sites = greville(flat, degree)
+    inverse = np.asarray(np.linalg.inv(basis_matrix(flat, degree, sites)), dtype=np.float64)
+    places = ((own, sites), (flat, fine), (own, fine))
+    return _Flattening(flat, inverse, *(Places.at(k, degree, t) for k, t in places))
 
 
 def _refined(knots: Floats, degree: int, span: tuple[float, float], split: int) -> Floats:
@@ -257,44 +259,6 @@ def seams_of(face: TopoDS_Face) -> Floats:
 
 def _is_spline(curve: BRepAdaptor_Curve2d) -> bool:
     return curve.GetType().name == "GeomAbs_BSplineCurve"
-
-
-def signed_area(loop: Floats) -> float:
-    """Area within a closed polyline (n, 2), positive counter-clockwise."""
-    x, y = (loop - loop.mean(axis=0)).T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-
-
-def inside(points: Floats, segments: Floats) -> NDArray[np.bool_]:
-    """Whether points (n, 2) lie within closed lines given as pieces (m, 2, 2): the even-odd rule."""
-    a, b = segments[None, :, 0], segments[None, :, 1]
-    p = points[:, None]
-    straddles = (a[..., 1] > p[..., 1]) != (b[..., 1] > p[..., 1])
-    rise = np.where(straddles, b[..., 1] - a[..., 1], 1.0)
-    x = a[..., 0] + (p[..., 1] - a[..., 1]) / rise * (b[..., 0] - a[..., 0])
-    return np.asarray(np.count_nonzero(straddles & (p[..., 0] < x), axis=1) % 2 == 1)
-
-
-def cross(a: Floats, b: Floats) -> bool:
-    """Whether any straight piece of a (n, 2, 2) meets one of b (m, 2, 2)."""
-    low, high = a.min(axis=(0, 1)), a.max(axis=(0, 1))
-    near = b[((b.max(axis=1) >= low) & (b.min(axis=1) <= high)).all(axis=1)]
-    return bool(meetings(a, near).any())
-
-
-def meetings(a: Floats, b: Floats) -> NDArray[np.bool_]:
-    """Which straight pieces of a (n, 2, 2) meet which of b (m, 2, 2): (n, m); parallel ones do not."""
-    p, r = a[:, None, 0], (a[:, 1] - a[:, 0])[:, None]
-    q, s = b[None, :, 0], (b[:, 1] - b[:, 0])[None]
-    d = q - p
-    det = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    # Pieces of one straight line are parallel but for rounding.
-    parallel = np.abs(det) <= _PARALLEL * np.linalg.norm(r, axis=-1) * np.linalg.norm(s, axis=-1)
-    safe = np.where(parallel, np.nan, det)
-    t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / safe
-    u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / safe
-    with np.errstate(invalid="ignore"):
-        return np.asarray((t >= 0) & (t <= 1) & (u >= 0) & (u <= 1))
 
 
 def surface_on(face: TopoDS_Face) -> HostSurface:

@@ -70,6 +70,11 @@ class _Place:
         return places_along(self.base)
 
     @cached_property
+    def few(self) -> NDArray[np.intp]:
+        """Those at which the base's curvature is looked at."""
+        return _even(len(self.s), _MOST_PLACES)
+
+    @cached_property
     def lines(self) -> NDArray[np.intp]:
         """Those from which other faces are looked for."""
         return _even(len(self.s), _MOST_LINES)
@@ -170,10 +175,9 @@ def headroom(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge) -> Headroom:
 
 
 def _headroom(place: _Place, ridge: Ridge) -> Headroom:
-    s, base, lines = place.s, place.base, place.lines
+    s, base, few, lines = place.s, place.base, place.few, place.lines
     width, height = (np.interp(s, ridge.arc_length, x) for x in (ridge.width, ridge.height))
     x = base.parameters(s, width[:, None] * _ETA)
-    few = _even(len(s), _MOST_PLACES)
     least, largest = _curvatures(base, x[few])
     rise = height[:, None] * ridge.section(_ETA)
     left, right = np.split(place.gaps(x[lines][:, _BESIDE]), 2, axis=2)

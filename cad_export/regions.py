@@ -19,7 +19,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Vertex, TopoDS_Wire
 
 from cad_export.check import subshapes
-from cad_export.footprint import inside, signed_area
+from cad_export.polylines import inside, signed_area
 
 Floats = NDArray[np.float64]
 

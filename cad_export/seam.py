@@ -20,9 +20,10 @@ from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from cad_export.certificate import Change
 from cad_export.check import subshapes
 from cad_export.crossings import Crossing, CutEdge, Stretch, crossings, cut_edges, outward, same_surface
-from cad_export.footprint import HostSurface, cross, inside, occt_curve, on_host, surface_on, wires_of
+from cad_export.footprint import HostSurface, occt_curve, on_host, surface_on, wires_of
 from cad_export.geometry import DEGENERATE
 from cad_export.inset_edges import Maker, Piece
+from cad_export.polylines import cross, inside
 from cad_export.regions import HalfEdge, half_edges, regions
 from cad_export.site import ON_HOST, Line, Loop, Site
 from cad_export.splitting import EdgeParts, KeptParts, kept_parts, split_edge, with_edges, with_faces

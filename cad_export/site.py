@@ -17,17 +17,14 @@ from cad_export.certificate import Ground, ground_under
 from cad_export.end_caps import Lift, lifts
 from cad_export.footprint import (
     OnHost,
-    cross,
-    inside,
-    meetings,
     occt_curve,
     on_host,
     seams_of,
     segments_of,
-    signed_area,
     surface_on,
     wires_of,
 )
+from cad_export.polylines import cross, inside, meetings, signed_area
 from cad_export.volume_by_height import VolumeByHeight
 from ridgefeature.bspline import Curve, Surface
 

@@ -56,16 +56,16 @@ class VolumeByHeight:
         raised = np.abs(rise).max(axis=0).max(axis=1) > 0  # axis by axis ten times as fast
         spans = np.flatnonzero(raised[v.near].any(axis=1))
         first, last = (v.near[spans[0], 0], v.near[spans[-1], -1]) if spans.size else (0, 0)
-        poles = np.stack([base.poles, rise])[:, :, first : last + 1].transpose(0, 3, 2, 1)
+        poles = np.stack([base.poles, rise], axis=1)[:, :, first : last + 1].swapaxes(2, 3)
         along = u.values(poles)  # (value or rate, base or rise, 3, v's poles, u's nodes)
+        weighed = along[0, 1] * u.weights.ravel()
         for k in spans:
             near = slice(v.near[k, 0] - first, v.near[k, -1] + 1 - first)
             value, rate = v.basis[0][k], v.basis[1][k]
-            d = value @ along[0, 1, :, near]  # (3, v's nodes, u's nodes), as all that follow
+            d = v.weights[k][:, None] * value @ weighed[:, near]  # (3, v's nodes, u's nodes), as what follows
             normals = _crosses(value @ along[1, :, :, near], rate @ along[0, :, :, near])
             normals[0, 1] += normals[1, 0]
             by_power = normals[0, 0], normals[0, 1], normals[1, 1]  # of h
-            d *= v.weights[k][:, None] * u.weights.ravel()
             swept += [np.vdot(d, n) for n in by_power]
             limits.append(_limits(*(np.einsum("kvu,kvu->vu", normals[0, 0], n) for n in by_power)))
         lows, highs = zip(*limits, strict=True)
@@ -112,10 +112,12 @@ class _Nodes:
     weights: Floats
 
     def values(self, poles: Floats) -> Floats:
-        """Values and derivatives (2, ..., all nodes) of splines with the poles (..., n)."""
-        near = np.moveaxis(poles, -1, 0).reshape(poles.shape[-1], -1)[self.near]
-        both = np.stack([np.matmul(basis, near).reshape(self.weights.size, -1).T for basis in self.basis])
-        return np.ascontiguousarray(both).reshape(2, *poles.shape[:-1], -1)
+        """Values and derivatives (2, ..., all nodes) of splines with the poles (n, ...)."""
+        near = poles.reshape(len(poles), -1)[self.near].swapaxes(1, 2)
+        made = np.empty((2, near.shape[1], *self.weights.shape))
+        for out, basis in zip(made, self.basis, strict=True):
+            np.matmul(near, basis.swapaxes(1, 2), out=out.swapaxes(0, 1))  # nodes last, without a copy
+        return made.reshape(2, *poles.shape[1:], -1)
 
 
 @lru_cache(16)

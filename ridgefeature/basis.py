@@ -7,6 +7,7 @@ No compiled code here: what a CAD script imports must stay light and survive a m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -131,7 +132,7 @@ class Places:
 def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> tuple[Floats, int]:
     """Knots as a read-only float64 copy, and the number of poles; ValueError when they do not fit."""
     _check_degree(degree)
-    k = np.array(knots, dtype=np.float64)
+    k = np.asarray(knots, dtype=np.float64)
     if k.ndim != 1 or k.size < 2 * (degree + 1):
         raise ValueError(
             f"expected at least {2 * (degree + 1)} knots for degree {degree}, got shape {k.shape}"
@@ -142,12 +143,18 @@ def checked_knots(knots: ArrayLike, degree: int, n_poles: int | None = None) -> 
             f"expected {n_poles + degree + 1} knots for {n_poles} poles of degree {degree}, got {k.size}; "
             "write repeated knots out, n_knots = n_poles + degree + 1"
         )
+    return _ascending(k.tobytes(), int(degree)), n
+
+
+@lru_cache(64)  # many curves and surfaces have the same
+def _ascending(knots: bytes, degree: int) -> Floats:
+    """Read-only knots from their bytes, checked to ascend without too many repeats."""
+    k = np.frombuffer(knots)
     if not (k[1:] >= k[:-1]).all() or not np.isfinite(k[[0, -1]]).all():
         raise ValueError(f"expected finite knots in ascending order, got {_brief(k)}; sort them")
     if (k[degree + 1 :] <= k[: -degree - 1]).any():
         raise ValueError(f"expected no knot more than {degree + 1} times, got {_brief(k)}; drop repeats")
-    k.setflags(write=False)
-    return k, n
+    return k
 
 
 def _inside(knots: Floats, degree: int, at: Floats) -> tuple[Floats, NDArray[np.bool_] | None]:

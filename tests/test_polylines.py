@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cad_export.footprint import meetings
+from cad_export.polylines import meetings
 
 
 def test_pieces_of_one_straight_line_do_not_meet_others_further_along():
