@@ -187,6 +187,22 @@ def test_numbers_that_are_not_finite_are_refused_where_shape_depends_on_them(rid
 
 
 @pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("width", -2.0, "width above 0, got -2"),
+        ("width", 0.0, "width above 0, got 0"),
+        ("border", -1.0, "border above 0, got -1"),
+        ("arc_length", 0.0, "arc_length to ascend"),
+    ],
+)
+def test_values_that_no_ridge_has_are_refused(ridge, name, value, message):
+    document = to_document(ridge)
+    document["stations"][name][3] = value
+    with pytest.raises(ValueError, match=f"expected {message}.*save the feature again"):
+        from_document(document)
+
+
+@pytest.mark.parametrize(
     ("name", "value"), [("position", 7), ("rotation", [1, 2]), ("std", [1.0]), ("scale", None), ("M", "x")]
 )
 def test_templates_of_the_wrong_shape_are_refused(ridge, name, value):

@@ -211,3 +211,9 @@ def _check_shapes(ridge: Ridge) -> None:
                 f"expected {f.name} of shape {want} and finite, got shape {array.shape}; "
                 "save the feature again"
             )
+    for name in ("width", "border"):
+        least = float(getattr(ridge, name).min())
+        if not least > 0:
+            raise ValueError(f"expected {name} above 0, got {least:g}; save the feature again")
+    if not (np.diff(ridge.arc_length) > 0).all():
+        raise ValueError("expected arc_length to ascend, it does not; save the feature again")
