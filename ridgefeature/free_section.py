@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from ridgefeature.basis import basis_matrix
-from ridgefeature.kernels.section_sums import section_sums
+from ridgefeature.kernels.section_sums import cell_sums, spline_sums
 from ridgefeature.kernels.strip import A, B, C, H, W
 from ridgefeature.section import Section
+from ridgefeature.smearing import Smeared
 
 Array = NDArray[np.float64]
 
@@ -27,6 +29,10 @@ _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
 _LEAST_SPANS = 20
+_NEAR_TOP = 0.6
+"""Part of the largest coefficient from which on one may be the top."""
+_TWO_HUMPS = 0.05
+"""Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +48,10 @@ class FreeSection:
     freedom: float
     """Effective number of coefficients."""
 
-    def applied(self, terms: Array) -> tuple[Section, Array]:
-        """The section, and a ridge's terms (n, 6) in its own widths and apex heights."""
+    def applied(self, terms: Array, name: str = FREE) -> tuple[Section, Array]:
+        """The section under this name, and a ridge's terms (n, 6) in its own widths and apex heights."""
         raised, base = self.found[3:-6], self.found[-3:]
-        section = Section(raised, FREE)
+        section = Section(raised, name)
         new = terms.copy()
         new[:, [A, B, C]] += base
         new[:, W] *= self.wider
@@ -56,24 +62,33 @@ class FreeSection:
 def free_section(
     points: Array,
     terms: Array,
-    section: Section,
-    noise: tuple[float, float, float],
+    seen: Smeared,
+    noise: tuple[float, float],
     spans: int,
     wider: float = WIDER,
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
-    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; noise: scale, strays' density and
-    evenness. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
+    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section before, smeared;
+    noise: scale and strays' density. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
     """
-    matrix, right = section_sums(points, terms, section.table, *noise, spans, wider)
+    matrix, right = _sums(points, terms, seen, noise, spans, wider)
     told = np.diagonal(matrix)
     if not (np.isfinite(matrix).all() and (told[-3:] > 0).all() and (told[:-3] > 0).any()):
         return None
-    found, freedom, _ = _smoothest(matrix, right, spans)
+    found, freedom, inverse = _smoothest(matrix, right, spans)
     if not found[3:-6].max() > 0:
         return None
-    return FreeSection(found, wider, _gain(matrix, right, found, section, spans, wider), freedom)
+    found = _one_humped(found, inverse, spans, _TWO_HUMPS * len(points))
+    return FreeSection(found, wider, _gain(matrix, right, found, seen.section, spans, wider), freedom)
+
+
+def _sums(
+    points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], spans: int, wider: float
+) -> tuple[Array, Array]:
+    """Normal equations of a section of so many spans, and of changes of the base."""
+    sums, base_matrix, base_right = cell_sums(points, terms, seen.told, *noise)
+    return spline_sums(sums, seen.basis(spans, wider), base_matrix, base_right)
 
 
 def trimmed(section: Section) -> tuple[Section, float, float]:
@@ -97,20 +112,16 @@ class SectionStd:
     apex: float = 0.0
     """Of its place."""
 
-    def in_parts_of(self, breadth: float) -> SectionStd:
-        """The same for widths that are `breadth` times these."""
-        rest = (x / breadth for x in (self.half_height_width, self.width, self.apex))
-        return SectionStd(self.height, *rest)
-
 
 def section_std(
-    points: Array, terms: Array, section: Section, noise: tuple[float, float, float], inflation: float
+    points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], inflation: float
 ) -> SectionStd:
     """How sure a learned section is; arguments as for `free_section`. Zeros for one that has a name."""
+    section = seen.section
     if section.name not in (LEARNED, FREE):
         return SectionStd()
     spans = section.spans
-    matrix, right = section_sums(points, terms, section.table, *noise, spans, 1.0)
+    matrix, right = _sums(points, terms, seen, noise, spans, 1.0)
     inverse = _smoothest(matrix, right, spans)[2]
     covariance = inflation * inverse[:-3, :-3]
     eta = np.linspace(-0.5, 0.5, 2001)
@@ -155,6 +166,38 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, A
         low, high = max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)
         lam = float(np.clip(free / max(rough, 1e-300), low, high))
     return found, free, inverse
+
+
+def _one_humped(found: Array, inverse: Array, spans: int, most: float) -> Array:
+    """The most likely coefficients that rise to an apex and fall from it, unless two humps are far likelier.
+
+    found, inverse: coefficients without this condition, and their covariance. Noise makes bumps, and the
+    highest would pass for the apex. most: twice the log likelihood ratio that this may cost.
+    """
+    inner = found[3:spans]
+    change = np.sign(np.diff(inner, prepend=0.0, append=0.0))
+    if (np.diff(change[change != 0]) != 0).sum() <= 1:
+        return found
+    # Given the inner ones the others follow.
+    precision = np.linalg.inv(inverse[3:spans, 3:spans])
+    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
+    steps = np.tri(len(inner))
+    best, kept = np.inf, inner
+    for top in np.flatnonzero(inner > _NEAR_TOP * inner.max()):
+        # Sums from the left up to the top, and from the right beyond it, of steps that are all upwards.
+        sums = np.where(np.arange(len(inner))[:, None] <= top, steps, steps.T) * (
+            (np.arange(len(inner))[:, None] <= top) == (np.arange(len(inner)) <= top)
+        )
+        rise, miss = nnls(root @ sums, root @ inner)
+        if miss < best:
+            best, kept = miss, sums @ rise
+    if best**2 > most or not kept.max() > 0:
+        return found
+    moved = found.copy()
+    moved[3:spans] = kept
+    rest = np.r_[spans + 3 : len(found)]
+    moved[rest] += inverse[rest, 3:spans] @ precision @ (kept - inner)
+    return moved
 
 
 def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: int, wider: float) -> float:

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.free_section import FREE, SPANS, WIDER, SectionStd, free_section, section_std
+from ridgefeature.free_section import FREE, LEARNED, SPANS, WIDER, SectionStd, free_section, section_std, trimmed
 from ridgefeature.grid import Grid
 from ridgefeature.kernels.strip import TERMS, A, B, C, E, H, W, information, mixture, offsets
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
+from ridgefeature.smearing import smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
 
 Array = NDArray[np.float64]
@@ -54,9 +55,9 @@ class Noise:
     """0 where points lie evenly over the base, 1 where evenly over the surface."""
 
     @property
-    def told(self) -> tuple[float, float, float]:
+    def told(self) -> tuple[float, float]:
         """As the kernels take it."""
-        return self.scale, self.density, self.even
+        return self.scale, self.density
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +77,6 @@ class Joint:
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
     section_std: SectionStd
-
-    def between_feet(self, section: Section, middle: float, breadth: float) -> Joint:
-        """The same with a section whose feet lie `breadth` apart about `middle`, in widths of the old one."""
-        change = np.eye(TERMS)
-        change[E, W], change[W, W] = middle, breadth
-        return replace(
-            self,
-            section=section,
-            terms=self.terms @ change.T,
-            smooth=self.smooth.changed(change),
-            section_std=self.section_std.in_parts_of(breadth),
-        )
 
     def without(self, term: int) -> Joint:
         """The same where one term is 0."""
@@ -152,13 +141,16 @@ def fit_whole(
         weights = smooth.weights
         terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
         terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-        if shaping and not last:
-            new, terms = _shaped(some, terms, section, noise, inflation)
-            shaping, section = new is not section, new
         if last:
             break
+        if shaping:
+            new, terms = _shaped(some, terms, section, noise, inflation)
+            shaping, section = new is not section, new
+        if section.name == FREE and (n == rounds - 2 or not shaping):
+            section, terms = _between_feet(some, terms, section, noise)
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
-    shape = section_std(some, terms, section, noise.told, inflation)
+    seen = smear(section, terms, noise.scale, noise.even)
+    shape = section_std(some, terms, seen, noise.told, inflation)
     return Joint(path, smooth, terms, section, matrix, goal, counts.astype(float), noise, inflation, shape)
 
 
@@ -166,9 +158,10 @@ def _linearised(
     points: Array, terms: Array, section: Section, noise: Noise, least: float
 ) -> tuple[Array, Array, Noise, float]:
     """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood."""
-    distances = offsets(points, terms, section.table)
+    seen = smear(section, terms, noise.scale, noise.even).told
+    distances = offsets(points, terms, seen)
     scale, strays, density = mixture(distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
-    matrix, right, sums = information(points, terms, section.table, scale, density, noise.even)
+    matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     return matrix, right, replace(noise, scale=scale, strays=strays, density=density), gain
 
@@ -184,9 +177,10 @@ def _shaped(
 ) -> tuple[Section, Array]:
     """The section and terms, or a free section and its terms where that is better beyond doubt."""
     price, best, kept = np.log(len(points)), 0.0, (section, terms)
+    seen = smear(section, terms, noise.scale, noise.even)
     wider = 1.0 if section.name == FREE else WIDER
     for spans in SPANS:
-        found = free_section(points, terms, section, noise.told, spans, wider)
+        found = free_section(points, terms, seen, noise.told, spans, wider)
         if found is None:
             continue
         cost = price * found.freedom
@@ -198,14 +192,26 @@ def _shaped(
     return kept
 
 
+def _between_feet(points: Array, terms: Array, section: Section, noise: Noise) -> tuple[Section, Array]:
+    """A free section and its terms between its feet, where it is fitted again."""
+    section, middle, breadth = trimmed(section)
+    terms = terms.copy()
+    terms[:, E] += middle * terms[:, W]
+    terms[:, W] *= breadth
+    found = free_section(
+        points, terms, smear(section, terms, noise.scale, noise.even), noise.told, section.spans, 1.0
+    )
+    return (section, terms) if found is None else found.applied(terms, LEARNED)
+
+
 def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> Noise:
     """The noise as some of the points tell it."""
     points = points[:: 1 + len(points) // _ENOUGH]
-    distances = offsets(points, terms, section.table)
+    distances = offsets(points, terms, smear(section, terms, 0.0, 0.0).told)
     scale = max(1.4826 * float(np.median(np.abs(distances))), _EXACT * h)
     span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
     scale, strays, density = mixture(distances, scale, _SOME_STRAYS, span, _EXACT * h, _FIRST_MIXTURE)
-    return Noise(scale, strays, density, span, _evenness(points, terms, section))
+    return Noise(scale, strays, density, span, _evenness(points, terms, section, scale))
 
 
 def _wanted(path: PathFrame) -> Array:
@@ -230,18 +236,25 @@ def _wanted(path: PathFrame) -> Array:
     return out
 
 
-def _evenness(points: Array, terms: Array, section: Section) -> float:
+def _evenness(points: Array, terms: Array, section: Section, noise: float) -> float:
     """0 where points lie evenly over the base, 1 where evenly over the surface, flanks too."""
     h, w = float(np.median(np.abs(terms[:, H]))), float(np.median(terms[:, W]))
 
     def stretched(eta: Array) -> Array:
         return np.asarray(np.sqrt(1.0 + (h / w * section(eta, 1)) ** 2))
 
-    eta = points[:, 1] / np.interp(points[:, 0], np.arange(len(terms)), terms[:, W])
-    even = np.linspace(-0.5, 0.5, 201)
-    on_base, on_surface = (1.0 / stretched(even)).mean(), 1.0 / stretched(even).mean()
-    found = (1.0 / stretched(eta[np.abs(eta) < 0.5])).mean()
-    return float(np.clip((on_base - found) / max(on_base - on_surface, 1e-12), 0.0, 1.0))
+    nodes = np.arange(len(terms))
+    width = np.interp(points[:, 0], nodes, terms[:, W])
+    eta = (points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E])) / width
+    places = np.linspace(-0.75, 0.75, 301)
+    dense = stretched(places)
+    if noise > 0:
+        spread = np.exp(-0.5 * ((places[:, None] - places) * w / noise) ** 2)
+        dense = (spread @ dense) / spread.sum(axis=1)
+    inner = np.abs(places) < 0.5
+    found = np.interp(eta[np.abs(eta) < 0.5], places, dense).mean()
+    on_base, on_surface = dense[inner].mean(), (dense[inner] ** 2).mean() / dense[inner].mean()
+    return float(np.clip((found - on_base) / max(on_surface - on_base, 1e-12), 0.0, 1.0))
 
 
 def _inflation(matrix: Array, right: Array) -> float:

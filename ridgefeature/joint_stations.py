@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
-from ridgefeature.free_section import FREE, trimmed
 from ridgefeature.grid import Grid
 from ridgefeature.joint import MOST_POINTS, SOME_POINTS, Joint, fit_whole
 from ridgefeature.kernels.strip import A, C, E, H, W
@@ -73,12 +72,10 @@ def refitted(
 def _fit(
     grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None, flat: bool
 ) -> Joint | None:
-    """The whole fit along a path, if it is sound, its section between its feet."""
+    """The whole fit along a path, if it is sound."""
     rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if weights is None else (_LAST_ROUNDS, MOST_POINTS)
     joint = fit_whole(grid, path, section, settings, weights, rounds, flat, most)
-    if joint is None or not _sound(joint):
-        return None
-    return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint
+    return joint if joint is not None and _sound(joint) else None
 
 
 def _between_ends(

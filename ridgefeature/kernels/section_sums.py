@@ -2,63 +2,82 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.residual import OPTIONS, split
-from ridgefeature.kernels.strip import noise_bias, share_of_surface, surface_at, terms_at
+from ridgefeature.kernels.residual import OPTIONS
+from ridgefeature.kernels.strip import Seen, seen_at, share_of_surface, terms_at
 
 Floats = NDArray[np.float64]
+BASE = 3
 
 
 @njit(**OPTIONS)
-def section_sums(
-    points: Floats,
-    terms: Floats,
-    table: Floats,
-    scale: float,
-    stray: float,
-    even: float,
-    spans: int,
-    wider: float,
-) -> tuple[Floats, Floats]:
-    """Normal equations, in units of the noise, of a section and of the base's offset, tilt and curvature.
+def cell_sums(
+    points: Floats, terms: Floats, seen: Seen, scale: float, stray: float
+) -> tuple[Floats, Floats, Floats]:
+    """Sums of what the points in each cell of the smeared section say, in units of the noise.
 
-    points, terms, table and noise as in kernels.strip. The section is a cubic spline on so many equal spans
-    over `wider` widths: its coefficients (spans + 3,) are heights in apex heights; the last three unknowns
-    change the base everywhere, in powers of y. The matrix is (spans + 6, spans + 6).
+    points, terms, seen and noise as in kernels.strip. With height x in local apex heights at a cell, and the
+    base's changes of offset, tilt and curvature (b, in powers of y): of each cell (m, cells, 5) the factors of
+    x^2, of x, and of x b in the normal equations, and the base's own (3, 3) and (3,).
     """
-    own = split(table)
-    n = spans + 6
-    matrix, right = np.zeros((n, n)), np.zeros(n)
-    index, row = np.empty(7, np.int64), np.empty(7)
-    for k in range(3):
-        index[4 + k] = spans + 3 + k
+    values, reach, stride = seen
+    cells = values.shape[1] - 1
+    out = np.zeros((values.shape[0], cells, 2 + BASE))
+    base_matrix, base_right = np.zeros((BASE, BASE)), np.zeros(BASE)
+    row = np.empty(BASE)
     for i in range(points.shape[0]):
         y = points[i, 1]
         _, there = terms_at(terms, points[i, 0])
-        base, f, _, eta, slope, bow = surface_at(y, there, own)
-        inverse = 1.0 / math.sqrt(1.0 + slope * slope)
+        m = np.int64(points[i, 0] / stride + 0.5)
+        base, f, _, _, eta, inverse = seen_at(y, there, values[m], reach)
         per_scale = inverse / scale
-        goal = (points[i, 2] - base) * per_scale - noise_bias(scale, bow, inverse, even)
-        weight = share_of_surface(goal - there[4] * f * per_scale, inverse, stray)
-        place = (eta / wider + 0.5) * spans
-        span = np.int64(min(max(place, 0.0), spans - 0.5))
-        t = place - span
-        raised = there[4] * per_scale if 0.0 <= t <= 1.0 else 0.0
-        s = 1.0 - t
-        row[0] = raised * s * s * s / 6.0
-        row[1] = raised * (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0
-        row[2] = raised * (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0
-        row[3] = raised * t * t * t / 6.0
-        row[4], row[5], row[6] = per_scale, y * per_scale, y * y * per_scale
-        for k in range(4):
-            index[k] = span + k
-        for k in range(7):
-            right[index[k]] += weight * goal * row[k]
-            for m in range(7):
-                matrix[index[k], index[m]] += weight * row[k] * row[m]
+        goal = (points[i, 2] - base) * per_scale
+        raised = there[4] * per_scale
+        weight = share_of_surface(goal - f * raised, inverse, stray)
+        row[0], row[1], row[2] = per_scale, y * per_scale, y * y * per_scale
+        for k in range(BASE):
+            base_right[k] += weight * goal * row[k]
+            for p in range(BASE):
+                base_matrix[k, p] += weight * row[k] * row[p]
+        place = (eta / reach + 1.0) * 0.5 * cells
+        if not 0.0 <= place < cells:
+            continue
+        own = out[m, np.int64(place)]
+        own[0] += weight * raised * raised
+        own[1] += weight * raised * goal
+        for k in range(BASE):
+            own[2 + k] += weight * raised * row[k]
+    return out, base_matrix, base_right
+
+
+@njit(**OPTIONS)
+def spline_sums(sums: Floats, basis: Floats, base_matrix: Floats, base_right: Floats) -> tuple[Floats, Floats]:
+    """Normal equations (n + 3, n + 3), (n + 3,) of a spline with n coefficients and the base's changes.
+
+    sums (m, cells, 5) as `cell_sums` has them; basis (m, cells, n): values of the spline's functions there.
+    """
+    n = basis.shape[2]
+    matrix, right = np.zeros((n + BASE, n + BASE)), np.zeros(n + BASE)
+    matrix[n:, n:], right[n:] = base_matrix, base_right
+    for m in range(basis.shape[0]):
+        for i in range(basis.shape[1]):
+            if sums[m, i, 0] == 0.0:
+                continue
+            row, low, high = basis[m, i], 0, n
+            while low < n and row[low] == 0.0:
+                low += 1
+            while high > low and row[high - 1] == 0.0:
+                high -= 1
+            for k in range(low, high):
+                right[k] += sums[m, i, 1] * row[k]
+                for p in range(low, k + 1):
+                    matrix[k, p] += sums[m, i, 0] * row[k] * row[p]
+                for p in range(BASE):
+                    matrix[n + p, k] += sums[m, i, 2 + p] * row[k]
+    for k in range(n + BASE):
+        for p in range(k):
+            matrix[p, k] = matrix[k, p]
     return matrix, right

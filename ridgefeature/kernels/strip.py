@@ -4,7 +4,8 @@ A path is given at nodes: origin, tangent, left and normal (n, 3) each, and the 
 across. Coordinates of a point are s in nodes, y along the base to the left, and z over the base.
 
 The surface is z = a + b y + c y^2 + h f((y - e) / w): the base's offset, tilt and curvature, the section f
-with height, width and its shift sideways. In all arrays they are ordered a, b, c, e, h, w.
+with height, width and its shift sideways. In all arrays they are ordered a, b, c, e, h, w. Points are held
+against the section as noise smears it (kernels.smeared).
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.residual import INNER, OPTIONS, split
+from ridgefeature.kernels.residual import INNER, OPTIONS
+from ridgefeature.kernels.smeared import smeared_at
 
 Floats = NDArray[np.float64]
 TERMS = 6
@@ -133,7 +135,7 @@ def _on_mean(px: float, py: float, pz: float, axes: Floats, j: int, u: float) ->
 
 
 Terms = tuple[float, float, float, float, float, float]
-Columns = tuple[Floats, Floats, Floats, Floats]
+Seen = tuple[Floats, float, int]
 
 
 @njit(**INNER)
@@ -153,33 +155,15 @@ def terms_at(terms: Floats, s: float) -> tuple[int, Terms]:
 
 
 @njit(**INNER)
-def surface_at(y: float, terms: Terms, table: Columns) -> tuple[float, float, float, float, float, float]:
-    """Height of the base and of the section (part of the apex height), how the latter changes with y for an
-    apex height of 1, place in widths, slope and second derivative of the surface."""
+def seen_at(y: float, terms: Terms, values: Floats, reach: float) -> tuple[float, float, float, float, float, float]:
+    """Where points seen at y are: base, mean height of the section, its slope and second derivative by place in
+    widths, that place, and 1 over the standard deviation of heights there in that of the noise."""
     a, b, c, e, h, w = terms
-    constant, linear, quadratic, cubic = table
-    spans = constant.size - 2.0
     eta = (y - e) / w
-    position = min(max((eta + 0.5) * spans + 1.0, 0.5), spans + 1.5)
-    span = np.int64(position)
-    t = position - span
-    per_y = spans / w
-    p, q, r = linear[span], quadratic[span], cubic[span]
-    f = constant[span] + t * (p + t * (q + t * r))
-    rate = per_y * (p + t * (2.0 * q + 3.0 * t * r))
-    bow = h * per_y * per_y * (2.0 * q + 6.0 * t * r)
-    return a + y * (b + c * y), f, rate, eta, b + 2.0 * c * y + h * rate, 2.0 * c + bow
-
-
-@njit(**INNER)
-def noise_bias(scale: float, bow: float, inverse: float, even: float) -> float:
-    """Mean distance, in noise scales, of points measured about a bent surface, seen at their own y.
-
-    The mean height at a measured y is that of the surface smeared over the noise. even: 0 for points that lie
-    evenly over the base, 1 evenly over the surface. inverse: 1 over the length of the surface's gradient.
-    """
-    bias = 0.5 * scale * bow * inverse * (1.0 + 2.0 * even * (1.0 - inverse * inverse))
-    return min(max(bias, -0.5), 0.5)
+    f, rate, bow, spread = smeared_at(eta, values, reach)
+    tilt, steep = b + 2.0 * c * y, h / w
+    variance = 1.0 + tilt * tilt + steep * (2.0 * tilt * rate + steep * spread)
+    return a + y * (b + c * y), f, rate, bow, eta, 1.0 / math.sqrt(max(variance, 0.1))
 
 
 @njit(**INNER)
@@ -189,14 +173,20 @@ def share_of_surface(r: float, inverse: float, stray: float) -> float:
 
 
 @njit(**OPTIONS)
-def offsets(points: Floats, terms: Floats, table: Floats) -> Floats:
-    """Distances (m,) of points (m, 3) in path coordinates from the surface; terms (nodes, 6)."""
-    own = split(table)
+def offsets(points: Floats, terms: Floats, seen: Seen) -> Floats:
+    """Distances (m,) of points (m, 3) in path coordinates from where they are expected; terms (nodes, 6).
+
+    They are heights in units of how much these scatter by the noise, times the noise: near a surface that is
+    nearly flat they are distances from it. seen: the smeared section (kernels.smeared) once a `stride` of
+    nodes, its reach, and that stride.
+    """
+    values, reach, stride = seen
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
         _, there = terms_at(terms, points[i, 0])
-        base, f, _, _, slope, _ = surface_at(points[i, 1], there, own)
-        out[i] = (points[i, 2] - base - there[4] * f) / math.sqrt(1.0 + slope * slope)
+        own = values[np.int64(points[i, 0] / stride + 0.5)]
+        base, f, _, _, _, inverse = seen_at(points[i, 1], there, own, reach)
+        out[i] = (points[i, 2] - base - there[4] * f) * inverse
     return out
 
 
@@ -226,41 +216,39 @@ def mixture(
 
 @njit(**OPTIONS)
 def information(
-    points: Floats, terms: Floats, table: Floats, scale: float, stray: float, even: float
+    points: Floats, terms: Floats, seen: Seen, scale: float, stray: float
 ) -> tuple[Floats, Floats, Floats]:
     """What the points of each stretch between two nodes say of the terms there.
 
     Weighted normal equations in units of the noise scale: matrices (nodes - 1, 6, 6), right sides
     (nodes - 1, 6), and the sums (4,) over all points of 1, weight, psi^2 and psi'. stray: as `mixture` has
-    it; even: as in `noise_bias`. Derivatives are taken at the point's own y and the stretch's middle.
+    it; seen: as `offsets`. Derivatives are taken at the point's own y and the stretch's middle. How much the
+    points scatter is taken as known: then their mean alone decides, whatever the shape of the noise.
     """
-    own = split(table)
+    values, reach, stride = seen
     stretches = terms.shape[0] - 1
     matrix, right = np.zeros((stretches, TERMS, TERMS)), np.zeros((stretches, TERMS))
     sums = np.zeros(4)
-    row, turn = np.empty(TERMS), np.empty(TERMS)
+    row = np.empty(TERMS)
     for i in range(points.shape[0]):
         y = points[i, 1]
         j, there = terms_at(terms, points[i, 0])
         h, w = there[4], there[5]
-        base, f, rate, eta, slope, bow = surface_at(y, there, own)
-        inverse = 1.0 / math.sqrt(1.0 + slope * slope)
-        r = (points[i, 2] - base - h * f) * inverse / scale - noise_bias(scale, bow, inverse, even)
+        m = np.int64(points[i, 0] / stride + 0.5)
+        base, f, rate, bow, eta, inverse = seen_at(y, there, values[m], reach)
+        inverse_scale = inverse / scale
+        r = (points[i, 2] - base - h * f) * inverse_scale
         weight = share_of_surface(r, inverse, stray)
         sums[0] += 1.0
         sums[1] += weight
         sums[2] += weight * weight * r * r
         sums[3] += weight - weight * (1.0 - weight) * r * r
-        # The likelihood of a height at its y also changes with the slope, by which distances are shortened.
-        curl = (r * r - 1.0) * slope * inverse * inverse
-        bow -= 2.0 * there[2]
-        turn[A], turn[B], turn[C] = 0.0, curl, 2.0 * y * curl
-        turn[E], turn[H], turn[W] = -bow * curl, rate * curl, -(h * rate / w + bow * eta) * curl
-        inverse /= scale
-        row[A], row[B], row[C] = inverse, y * inverse, y * y * inverse
-        row[E], row[H], row[W] = -h * rate * inverse, f * inverse, -h * rate * eta * inverse
+        blur = scale / w
+        row[A], row[B], row[C] = 1.0, y, y * y
+        row[E], row[H], row[W] = -h * rate / w, f, -h * (rate * eta + bow * blur * blur) / w
         for p in range(TERMS):
-            right[j, p] += weight * (r * row[p] + turn[p])
+            row[p] *= inverse_scale
+            right[j, p] += weight * r * row[p]
             for q in range(p + 1):
                 matrix[j, p, q] += weight * row[p] * row[q]
     for j in range(stretches):

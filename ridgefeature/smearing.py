@@ -1,0 +1,77 @@
+"""What a section looks like to points as noisy as a ridge's, along the whole ridge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.smeared import smeared, smeared_basis
+from ridgefeature.kernels.strip import H, W
+from ridgefeature.path_frame import NODES_A_WIDTH
+from ridgefeature.section import Section
+
+Array = NDArray[np.float64]
+
+_CELLS = 128
+"""Places a width at which a smeared section is tabulated."""
+_REACH = 4.0
+"""Standard deviations of the noise by which a smeared section is wider."""
+_LEAST_BLUR, _MOST_BLUR = 1e-4, 0.25
+"""In widths: below, nothing is seen of it; above, no section is."""
+_RULES = ((0.02, 5), (0.06, 9), (np.inf, 21))
+"""Up to which blur how many places of a Gauss-Hermite quadrature are enough."""
+
+
+@dataclass(frozen=True, eq=False)
+class Smeared:
+    """A section smeared over the noise, once a width along the ridge.
+
+    values (m, cells + 1, 3) as kernels.smeared has them, between -reach and reach; blur, steepness (m,): noise
+    in widths, apex heights in widths there; even: 0 where points lie evenly over the base, 1 where over the
+    surface.
+    """
+
+    section: Section
+    values: Array
+    reach: float
+    blur: Array
+    steepness: Array
+    even: float
+
+    @property
+    def told(self) -> tuple[Array, float, int]:
+        """As the kernels take it."""
+        return self.values, self.reach, NODES_A_WIDTH
+
+    def basis(self, spans: int, wider: float) -> Array:
+        """Smeared splines (m, cells, spans + 3) of so many spans over `wider` widths, at the cells' middles."""
+        cells = self.values.shape[1] - 1
+        middles = ((np.arange(cells) + 0.5) / cells * 2.0 - 1.0) * self.reach
+        rule = _rule(float(self.blur.max()))
+        return np.stack(
+            [
+                smeared_basis(self.section.table, b, k, self.even, *rule, middles, spans, wider)
+                for b, k in zip(self.blur, self.steepness, strict=True)
+            ]
+        )
+
+
+def smear(section: Section, terms: Array, noise: float, even: float) -> Smeared:
+    """The section of a ridge with these terms (n, 6) at its nodes, smeared over noise of this deviation."""
+    places = np.arange(0, len(terms) + NODES_A_WIDTH // 2, NODES_A_WIDTH).clip(max=len(terms) - 1)
+    h, w = terms[places, H], terms[places, W]
+    blur = np.clip(noise / w, _LEAST_BLUR, _MOST_BLUR)
+    steepness = np.abs(h) / w
+    reach = 0.5 + _REACH * float(blur.max())
+    cells = 2 * int(np.ceil(reach * _CELLS))
+    values = smeared(section.table, blur, steepness, even, *_rule(float(blur.max())), reach, cells)
+    return Smeared(section, values, reach, blur, steepness, even)
+
+
+def _rule(blur: float) -> tuple[Array, Array]:
+    """Places and shares of a quadrature over the standard normal distribution."""
+    count = next(n for most, n in _RULES if blur <= most)
+    places, shares = np.polynomial.hermite.hermgauss(count)
+    return np.asarray(np.sqrt(2.0) * places), np.asarray(shares / np.sqrt(np.pi))
