@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from ridgefeature.basis import basis_matrix
 from ridgefeature.kernels.section_sums import cell_sums, spline_sums
-from ridgefeature.kernels.strip import A, B, C, H, W
+from ridgefeature.kernels.strip import A, B, C, E, H, W
+from ridgefeature.one_hump import one_hump, symmetric_hump
 from ridgefeature.section import Section
 from ridgefeature.smearing import Smeared
 
@@ -29,8 +29,6 @@ _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
 _LEAST_SPANS = 20
-_NEAR_TOP = 0.6
-"""Part of the largest coefficient from which on one may be the top."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -47,6 +45,8 @@ class FreeSection:
     """Twice the log likelihood ratio against the section before."""
     freedom: float
     """Effective number of coefficients."""
+    shift: float = 0.0
+    """How far it lies to the left, in widths of the section before."""
 
     def applied(self, terms: Array, name: str = FREE) -> tuple[Section, Array]:
         """The section under this name, and a ridge's terms (n, 6) in its own widths and apex heights."""
@@ -54,6 +54,7 @@ class FreeSection:
         section = Section(raised, name)
         new = terms.copy()
         new[:, [A, B, C]] += base
+        new[:, E] += self.shift * new[:, W]
         new[:, W] *= self.wider
         new[:, H] *= float(raised.max() / section.coefficients.max())
         return section, new
@@ -65,12 +66,13 @@ def free_section(
     seen: Smeared,
     noise: tuple[float, float],
     spans: int,
+    price: float,
     wider: float = WIDER,
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
     points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section before, smeared;
-    noise: scale and strays' density. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
+    noise: scale and strays' density; price: of a coefficient, in twice the log likelihood ratio. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
     """
     matrix, right = _sums(points, terms, seen, noise, spans, wider)
     told = np.diagonal(matrix)
@@ -79,8 +81,10 @@ def free_section(
     found, freedom, inverse = _smoothest(matrix, right, spans)
     if not found[3:-6].max() > 0:
         return None
-    found = _one_humped(found, inverse, spans, _TWO_HUMPS * len(points))
-    return FreeSection(found, wider, _gain(matrix, right, found, seen.section, spans, wider), freedom)
+    cost = 0.5 * price * freedom
+    found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * len(points), cost))
+    gain = _gain(matrix, right, found, seen.section, spans, wider)
+    return FreeSection(found, wider, gain, part * freedom, shift * wider / spans)
 
 
 def _sums(
@@ -168,36 +172,32 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, A
     return found, free, inverse
 
 
-def _one_humped(found: Array, inverse: Array, spans: int, most: float) -> Array:
-    """The most likely coefficients that rise to an apex and fall from it, unless two humps are far likelier.
+def _humped(found: Array, inverse: Array, spans: int, price: float, most: float) -> tuple[Array, float, float]:
+    """The coefficients that rise to an apex and fall from it, symmetric unless that costs too much.
 
-    found, inverse: coefficients without this condition, and their covariance. Noise makes bumps, and the
-    highest would pass for the apex. most: twice the log likelihood ratio that this may cost.
+    found, inverse: coefficients without this condition, and their covariance; price: what a symmetric one may
+    cost, most: what one hump may, in twice the log likelihood ratio. Noise makes bumps, and the highest would
+    pass for the apex. Also by how many knots the symmetric one is moved, and what part of the coefficients
+    are free.
     """
     inner = found[3:spans]
-    change = np.sign(np.diff(inner, prepend=0.0, append=0.0))
-    if (np.diff(change[change != 0]) != 0).sum() <= 1:
-        return found
     # Given the inner ones the others follow.
     precision = np.linalg.inv(inverse[3:spans, 3:spans])
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
-    steps = np.tri(len(inner))
-    best, kept = np.inf, inner
-    for top in np.flatnonzero(inner > _NEAR_TOP * inner.max()):
-        # Sums from the left up to the top, and from the right beyond it, of steps that are all upwards.
-        sums = np.where(np.arange(len(inner))[:, None] <= top, steps, steps.T) * (
-            (np.arange(len(inner))[:, None] <= top) == (np.arange(len(inner)) <= top)
-        )
-        rise, miss = nnls(root @ sums, root @ inner)
-        if miss < best:
-            best, kept = miss, sums @ rise
-    if best**2 > most or not kept.max() > 0:
-        return found
-    moved = found.copy()
-    moved[3:spans] = kept
+    one, cost = one_hump(inner, root)
+    even, shift, even_cost = symmetric_hump(inner, root)
+    part = 1.0
+    if even_cost - cost < price and even_cost < most:
+        one, cost, part = even, even_cost, 0.5
+    else:
+        shift = 0.0
+    if cost > most or not one.max() > 0:
+        return found, 0.0, 1.0
+    out = found.copy()
+    out[3:spans] = one
     rest = np.r_[spans + 3 : len(found)]
-    moved[rest] += inverse[rest, 3:spans] @ precision @ (kept - inner)
-    return moved
+    out[rest] += inverse[rest, 3:spans] @ precision @ (one - inner)
+    return out, shift, part
 
 
 def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: int, wider: float) -> float:

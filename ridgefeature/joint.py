@@ -147,7 +147,7 @@ def fit_whole(
             new, terms = _shaped(some, terms, section, noise, inflation)
             shaping, section = new is not section, new
         if section.name == FREE and (n == rounds - 2 or not shaping):
-            section, terms = _between_feet(some, terms, section, noise)
+            section, terms = _between_feet(some, terms, section, noise, inflation)
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
     seen = smear(section, terms, noise.scale, noise.even)
     shape = section_std(some, terms, seen, noise.told, inflation)
@@ -180,7 +180,7 @@ def _shaped(
     seen = smear(section, terms, noise.scale, noise.even)
     wider = 1.0 if section.name == FREE else WIDER
     for spans in SPANS:
-        found = free_section(points, terms, seen, noise.told, spans, wider)
+        found = free_section(points, terms, seen, noise.told, spans, inflation * price, wider)
         if found is None:
             continue
         cost = price * found.freedom
@@ -192,15 +192,16 @@ def _shaped(
     return kept
 
 
-def _between_feet(points: Array, terms: Array, section: Section, noise: Noise) -> tuple[Section, Array]:
+def _between_feet(
+    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
+) -> tuple[Section, Array]:
     """A free section and its terms between its feet, where it is fitted again."""
     section, middle, breadth = trimmed(section)
     terms = terms.copy()
     terms[:, E] += middle * terms[:, W]
     terms[:, W] *= breadth
-    found = free_section(
-        points, terms, smear(section, terms, noise.scale, noise.even), noise.told, section.spans, 1.0
-    )
+    seen, price = smear(section, terms, noise.scale, noise.even), inflation * np.log(len(points))
+    found = free_section(points, terms, seen, noise.told, section.spans, price, 1.0)
     return (section, terms) if found is None else found.applied(terms, LEARNED)
 
 
