@@ -53,6 +53,8 @@ class Noise:
     """Distances that strays may have, in all."""
     even: float
     """0 where points lie evenly over the base, 1 where evenly over the surface."""
+    blur: float
+    """Standard deviation of the places of points: that of heights, without what a wrong section adds."""
 
     @property
     def told(self) -> tuple[float, float]:
@@ -149,7 +151,7 @@ def fit_whole(
         if section.name == FREE and (n == rounds - 2 or not shaping):
             section, terms = _between_feet(some, terms, section, noise, inflation)
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
-    seen = smear(section, terms, noise.scale, noise.even)
+    seen = smear(section, terms, noise.blur, noise.even)
     shape = section_std(some, terms, seen, noise.told, inflation)
     return Joint(path, smooth, terms, section, matrix, goal, counts.astype(float), noise, inflation, shape)
 
@@ -158,12 +160,13 @@ def _linearised(
     points: Array, terms: Array, section: Section, noise: Noise, least: float
 ) -> tuple[Array, Array, Noise, float]:
     """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood."""
-    seen = smear(section, terms, noise.scale, noise.even).told
+    seen = smear(section, terms, noise.blur, noise.even).told
     distances = offsets(points, terms, seen)
     scale, strays, density = mixture(distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
+    blur = _blur(points, terms, distances, scale, noise.span, least)
     matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
-    return matrix, right, replace(noise, scale=scale, strays=strays, density=density), gain
+    return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain
 
 
 def _fix(matrix: Array, goal: Array, term: int) -> None:
@@ -177,7 +180,7 @@ def _shaped(
 ) -> tuple[Section, Array]:
     """The section and terms, or a free section and its terms where that is better beyond doubt."""
     price, best, kept = np.log(len(points)), 0.0, (section, terms)
-    seen = smear(section, terms, noise.scale, noise.even)
+    seen = smear(section, terms, noise.blur, noise.even)
     wider = 1.0 if section.name == FREE else WIDER
     for spans in SPANS:
         found = free_section(points, terms, seen, noise.told, spans, inflation * price, wider)
@@ -200,7 +203,7 @@ def _between_feet(
     terms = terms.copy()
     terms[:, E] += middle * terms[:, W]
     terms[:, W] *= breadth
-    seen, price = smear(section, terms, noise.scale, noise.even), inflation * np.log(len(points))
+    seen, price = smear(section, terms, noise.blur, noise.even), inflation * np.log(len(points))
     found = free_section(points, terms, seen, noise.told, section.spans, price, 1.0)
     return (section, terms) if found is None else found.applied(terms, LEARNED)
 
@@ -212,7 +215,18 @@ def _first_noise(points: Array, terms: Array, section: Section, h: float, w: flo
     scale = max(1.4826 * float(np.median(np.abs(distances))), _EXACT * h)
     span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
     scale, strays, density = mixture(distances, scale, _SOME_STRAYS, span, _EXACT * h, _FIRST_MIXTURE)
-    return Noise(scale, strays, density, span, _evenness(points, terms, section, scale))
+    blur = _blur(points, terms, distances, scale, span, _EXACT * h)
+    return Noise(scale, strays, density, span, _evenness(points, terms, section, blur), blur)
+
+
+def _blur(points: Array, terms: Array, distances: Array, scale: float, span: float, least: float) -> float:
+    """The noise as points beyond the feet tell it, but no more than all of them do."""
+    nodes = np.arange(len(terms))
+    aside = np.abs(points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E]))
+    beyond = distances[aside > 0.5 * np.interp(points[:, 0], nodes, terms[:, W])]
+    if len(beyond) < _FEWEST:
+        return scale
+    return min(mixture(beyond, scale, _SOME_STRAYS, span, least, _FIRST_MIXTURE)[0], scale)
 
 
 def _wanted(path: PathFrame) -> Array:
