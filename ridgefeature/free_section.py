@@ -17,8 +17,8 @@ from ridgefeature.smearing import Smeared
 
 Array = NDArray[np.float64]
 
-SPANS = (14, 28)
-"""Spans of the free spline, over WIDER widths."""
+SPANS = 28
+"""Of the free spline, over WIDER widths."""
 WIDER = 1.25
 FREE = "free"
 LEARNED = "learned"
@@ -172,7 +172,9 @@ def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, A
     return found, free, inverse
 
 
-def _humped(found: Array, inverse: Array, spans: int, price: float, most: float) -> tuple[Array, float, float]:
+def _humped(
+    found: Array, inverse: Array, spans: int, price: float, most: float
+) -> tuple[Array, float, float]:
     """The coefficients that rise to an apex and fall from it, symmetric unless that costs too much.
 
     found, inverse: coefficients without this condition, and their covariance; price: what a symmetric one may

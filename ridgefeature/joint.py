@@ -7,59 +7,43 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.free_section import FREE, LEARNED, SPANS, WIDER, SectionStd, free_section, section_std, trimmed
+from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
-from ridgefeature.kernels.strip import TERMS, A, B, C, E, H, W, information, mixture, offsets
+from ridgefeature.kernels.strip import (
+    TERMS,
+    A,
+    B,
+    C,
+    E,
+    H,
+    W,
+    information,
+    mixture,
+    offsets,
+)
+from ridgefeature.noise import EXACT, Noise, blur_of, first_noise, inflation_of
 from ridgefeature.path_frame import PathFrame, points_along
-from ridgefeature.section import Section
+from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
-from ridgefeature.smearing import smear
+from ridgefeature.shaping import between_feet, shaped, with_half_height_width
+from ridgefeature.smearing import log_likelihood, smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 4
 _WITHOUT_SHAPING = 1
 """Round, from 0, that is the last one where the section stays as it is."""
-_FIRST_MIXTURE, _NEXT_MIXTURE = 15, 3
+_NEXT_MIXTURE = 3
 MOST_POINTS, SOME_POINTS = 300_000, 20_000
 """As many are looked at in the last round, and before it."""
-_ENOUGH = 5000
-"""Points that tell the noise well enough to begin with."""
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
-_SOME_STRAYS = 0.05
-_EXACT = 5e-3
-"""Least noise, in apex heights: splines are no nearer to a real ridge, and what they miss is no stray."""
-_BLOCK = 5
-"""Nodes over which noise may be correlated."""
-_MEDIAN = 0.89
-"""Median of chi-square with six degrees of freedom, by its mean."""
+_TRIAL_ROUNDS = 4
+"""Of each of the two sections that a fit may begin with."""
+_TELLING = 3000
+"""Points that tell which of two sections is likelier."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Distances of points from the surface: normal, and those of strays, spread evenly."""
-
-    scale: float
-    """Standard deviation of those that are no strays."""
-    strays: float
-    """Share of points that are strays."""
-    density: float
-    """Of strays, by that of the others at their middle."""
-    span: float
-    """Distances that strays may have, in all."""
-    even: float
-    """0 where points lie evenly over the base, 1 where evenly over the surface."""
-    blur: float
-    """Standard deviation of the places of points: that of heights, without what a wrong section adds."""
-
-    @property
-    def told(self) -> tuple[float, float]:
-        """As the kernels take it."""
-        return self.scale, self.density
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,60 +94,128 @@ def fit_whole(
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
-    weights (6,): of the penalties of an earlier fit, to begin with. rounds: at most, of which the last does
-    not change the section any more. flat: the base stays as curved across as the path has it. most: about
-    as many points are looked at.
+    weights (6,): of the penalties of an earlier fit, to begin with; None: there was none, and the section may
+    be far off. rounds: at most, of which the last does not change the section any more. flat: the base stays
+    as curved across as the path has it. most: about as many points are looked at.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
     if len(points) < _FEWEST:
         return None
     some = points[:: 1 + len(points) // SOME_POINTS]
-    h, w = float(np.median(np.abs(path.height))), float(np.median(path.width))
+    shaping = settings.section in ("auto", "learned")
+    state: _State | None = _begun(some, path, section, weights)
+    if weights is None and shaping:
+        state = _likelier(some, path, state, flat)
+    for n in range(rounds):
+        last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
+        state = _improved(points if last else some, path, state, flat)
+        if state is None:
+            return None
+        if last:
+            break
+        if shaping:
+            new = state.given(*shaped(some, state.terms, state.section, state.noise, state.inflation))
+            shaping, state = new.section is not state.section, new
+        if state.section.name == FREE and (n == rounds - 2 or not shaping):
+            state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
+    return _joint(points, some, path, state)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """What is known of a ridge between two rounds of its fit."""
+
+    terms: Array
+    section: Section
+    noise: Noise
+    weights: Array
+    inflation: float = 1.0
+    smooth: Smooth | None = None
+    matrix: Array | None = None
+    goal: Array | None = None
+
+    def given(self, section: Section, terms: Array) -> _State:
+        return replace(self, section=section, terms=terms)
+
+
+def _begun(points: Array, path: PathFrame, section: Section, weights: Array | None) -> _State:
+    h, w = _sizes(path)
     if weights is None:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
     terms = np.zeros((len(path.at), TERMS))
     terms[:, H], terms[:, W] = path.height, path.width
+    return _State(terms, section, first_noise(points, terms, section, h, w), weights)
+
+
+def _sizes(path: PathFrame) -> tuple[float, float]:
+    """Usual height, where the ridge is known, and width."""
+    known = np.abs(path.height[path.height != 0])
+    width = float(np.median(path.width))
+    return float(np.median(known)) if len(known) else width, width
+
+
+def _likelier(points: Array, path: PathFrame, state: _State, flat: bool) -> _State | None:
+    """After one round, the ridge with the section that it has or with a box, whichever is likelier."""
+    wider = with_half_height_width(state.terms, state.section, box())
+    other = _State(wider, box(), first_noise(points, wider, box(), *_sizes(path)), state.weights)
+    best, kept = -np.inf, None
+    for start in (state, other):
+        found: _State | None = start
+        for _ in range(_TRIAL_ROUNDS):
+            found = _improved(points, path, found, flat)
+        if found is not None and (chance := _chance(points, found)) > best:
+            best, kept = chance, found
+    return kept
+
+
+def _chance(points: Array, state: _State) -> float:
+    """Log likelihood of the points' heights."""
+    noise = state.noise
+    points = points[:: 1 + len(points) // _TELLING]
+    told = noise.blur, noise.even, noise.strays, noise.span
+    return log_likelihood(points, state.terms, state.section, *told) / len(points)
+
+
+def _improved(points: Array, path: PathFrame, state: _State | None, flat: bool) -> _State | None:
+    """All terms fitted again; None where nothing finite came of it."""
+    if state is None:
+        return None
+    matrix, goal, noise, gain = _linearised(points, state, EXACT * _sizes(path)[0])
+    if not np.isfinite(matrix).all() or not np.isfinite(gain):
+        return None
+    inflation = inflation_of(gain * matrix, gain * goal) if state.smooth is not None else state.inflation
+    goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
+    matrix, goal = gain / inflation * matrix, gain / inflation * goal
+    if flat:
+        _fix(matrix, goal, C)
+    middle = 0.5 * (path.knots[1:] + path.knots[:-1])
+    smooth = smoothest(matrix, goal, middle, path.coefficients, _wanted(path), state.weights)
     first, basis = basis_at(path.coefficients, path.knots)
-    middle, wanted = 0.5 * (path.knots[1:] + path.knots[:-1]), _wanted(path)
-    noise, inflation = _first_noise(some, terms, section, h, w), 1.0
-    shaping = settings.section in ("auto", "learned")
-    for n in range(rounds):
-        last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
-        matrix, goal, noise, gain = _linearised(points if last else some, terms, section, noise, _EXACT * h)
-        if not np.isfinite(matrix).all() or not np.isfinite(gain):
-            return None
-        if n > 0:
-            inflation = _inflation(gain * matrix, gain * goal)
-        at = 0.5 * (terms[1:] + terms[:-1])
-        goal += np.einsum("nij,nj->ni", matrix, at)
-        matrix, goal = gain / inflation * matrix, gain / inflation * goal
-        if flat:
-            _fix(matrix, goal, C)
-        smooth = smoothest(matrix, goal, middle, path.coefficients, wanted, weights)
-        weights = smooth.weights
-        terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
-        terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-        if last:
-            break
-        if shaping:
-            new, terms = _shaped(some, terms, section, noise, inflation)
-            shaping, section = new is not section, new
-        if section.name == FREE and (n == rounds - 2 or not shaping):
-            section, terms = _between_feet(some, terms, section, noise, inflation)
-    counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
-    seen = smear(section, terms, noise.blur, noise.even)
+    terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
+    if not np.isfinite(terms).all():
+        return None
+    terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
+    return _State(terms, state.section, noise, smooth.weights, inflation, smooth, matrix, goal)
+
+
+def _joint(points: Array, some: Array, path: PathFrame, state: _State) -> Joint:
+    stretches = len(path.at) - 1
+    counts = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches].astype(float)
+    terms, noise, inflation = state.terms, state.noise, state.inflation
+    seen = smear(state.section, terms, noise.blur, noise.even)
     shape = section_std(some, terms, seen, noise.told, inflation)
-    return Joint(path, smooth, terms, section, matrix, goal, counts.astype(float), noise, inflation, shape)
+    smooth, matrix, goal = state.smooth, state.matrix, state.goal
+    assert smooth is not None and matrix is not None and goal is not None
+    return Joint(path, smooth, terms, state.section, matrix, goal, counts, noise, inflation, shape)
 
 
-def _linearised(
-    points: Array, terms: Array, section: Section, noise: Noise, least: float
-) -> tuple[Array, Array, Noise, float]:
+def _linearised(points: Array, state: _State, least: float) -> tuple[Array, Array, Noise, float]:
     """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood."""
-    seen = smear(section, terms, noise.blur, noise.even).told
-    distances = offsets(points, terms, seen)
-    scale, strays, density = mixture(distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
-    blur = _blur(points, terms, distances, scale, noise.span, least)
+    terms, noise = state.terms, state.noise
+    seen = smear(state.section, terms, noise.blur, noise.even).told
+    distances = offsets(points, terms, seen, noise.scale)
+    scale, strays, density = mixture(*distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
+    blur = blur_of(points, terms, distances[0], scale, noise.span, least)
     matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain
@@ -173,60 +225,6 @@ def _fix(matrix: Array, goal: Array, term: int) -> None:
     """Let normal equations ask for 0 of one term, whatever the others are."""
     goal[:, term] = matrix[:, term] = matrix[:, :, term] = 0.0
     matrix[:, term, term] = 1.0
-
-
-def _shaped(
-    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
-) -> tuple[Section, Array]:
-    """The section and terms, or a free section and its terms where that is better beyond doubt."""
-    price, best, kept = np.log(len(points)), 0.0, (section, terms)
-    seen = smear(section, terms, noise.blur, noise.even)
-    wider = 1.0 if section.name == FREE else WIDER
-    for spans in SPANS:
-        found = free_section(points, terms, seen, noise.told, spans, inflation * price, wider)
-        if found is None:
-            continue
-        cost = price * found.freedom
-        net = found.gain / inflation - cost
-        if net > best:
-            best, kept = net, found.applied(terms)
-        if net < -0.5 * cost:
-            break  # nor will a finer one do
-    return kept
-
-
-def _between_feet(
-    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
-) -> tuple[Section, Array]:
-    """A free section and its terms between its feet, where it is fitted again."""
-    section, middle, breadth = trimmed(section)
-    terms = terms.copy()
-    terms[:, E] += middle * terms[:, W]
-    terms[:, W] *= breadth
-    seen, price = smear(section, terms, noise.blur, noise.even), inflation * np.log(len(points))
-    found = free_section(points, terms, seen, noise.told, section.spans, price, 1.0)
-    return (section, terms) if found is None else found.applied(terms, LEARNED)
-
-
-def _first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> Noise:
-    """The noise as some of the points tell it."""
-    points = points[:: 1 + len(points) // _ENOUGH]
-    distances = offsets(points, terms, smear(section, terms, 0.0, 0.0).told)
-    scale = max(1.4826 * float(np.median(np.abs(distances))), _EXACT * h)
-    span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
-    scale, strays, density = mixture(distances, scale, _SOME_STRAYS, span, _EXACT * h, _FIRST_MIXTURE)
-    blur = _blur(points, terms, distances, scale, span, _EXACT * h)
-    return Noise(scale, strays, density, span, _evenness(points, terms, section, blur), blur)
-
-
-def _blur(points: Array, terms: Array, distances: Array, scale: float, span: float, least: float) -> float:
-    """The noise as points beyond the feet tell it, but no more than all of them do."""
-    nodes = np.arange(len(terms))
-    aside = np.abs(points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E]))
-    beyond = distances[aside > 0.5 * np.interp(points[:, 0], nodes, terms[:, W])]
-    if len(beyond) < _FEWEST:
-        return scale
-    return min(mixture(beyond, scale, _SOME_STRAYS, span, least, _FIRST_MIXTURE)[0], scale)
 
 
 def _wanted(path: PathFrame) -> Array:
@@ -249,41 +247,3 @@ def _wanted(path: PathFrame) -> Array:
     centres = np.clip(np.arange(n) - 1.0, 0.0, n - 3.0)
     out[C, : n - 1] = -np.diff(0.5 * np.interp(centres, path.knots, path.curvature))
     return out
-
-
-def _evenness(points: Array, terms: Array, section: Section, noise: float) -> float:
-    """0 where points lie evenly over the base, 1 where evenly over the surface, flanks too."""
-    h, w = float(np.median(np.abs(terms[:, H]))), float(np.median(terms[:, W]))
-
-    def stretched(eta: Array) -> Array:
-        return np.asarray(np.sqrt(1.0 + (h / w * section(eta, 1)) ** 2))
-
-    nodes = np.arange(len(terms))
-    width = np.interp(points[:, 0], nodes, terms[:, W])
-    eta = (points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E])) / width
-    places = np.linspace(-0.75, 0.75, 301)
-    dense = stretched(places)
-    if noise > 0:
-        spread = np.exp(-0.5 * ((places[:, None] - places) * w / noise) ** 2)
-        dense = (spread @ dense) / spread.sum(axis=1)
-    inner = np.abs(places) < 0.5
-    found = np.interp(eta[np.abs(eta) < 0.5], places, dense).mean()
-    on_base, on_surface = dense[inner].mean(), (dense[inner] ** 2).mean() / dense[inner].mean()
-    return float(np.clip((found - on_base) / max(on_surface - on_base, 1e-12), 0.0, 1.0))
-
-
-def _inflation(matrix: Array, right: Array) -> float:
-    """Variance of sums over blocks of nodes by that of independent noise, 1 or more."""
-    n = len(matrix) // _BLOCK * _BLOCK
-    whole = matrix[:n].reshape(-1, _BLOCK, TERMS, TERMS).sum(axis=1)
-    pull = right[:n].reshape(-1, _BLOCK, TERMS).sum(axis=1)
-    sizes = np.sqrt(np.einsum("nii->ni", whole))
-    good = (sizes > 0).all(axis=1)
-    if not good.any():
-        return 1.0
-    scaled = whole[good] / (sizes[good, :, None] * sizes[good, None])
-    values, vectors = np.linalg.eigh(scaled)
-    seen = np.einsum("nij,ni->nj", vectors, pull[good] / sizes[good]) ** 2
-    told = values > 1e-6
-    each = np.where(told, seen / np.maximum(values, 1e-6), 0.0).sum(axis=1) / told.sum(axis=1)
-    return max(1.0, float(np.median(each)) / _MEDIAN)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.smeared import log_likelihood as kernel
 from ridgefeature.kernels.smeared import smeared, smeared_basis
 from ridgefeature.kernels.strip import H, W
 from ridgefeature.path_frame import NODES_A_WIDTH
@@ -20,15 +21,17 @@ _REACH = 4.0
 """Standard deviations of the noise by which a smeared section is wider."""
 _LEAST_BLUR, _MOST_BLUR = 1e-4, 0.25
 """In widths: below, nothing is seen of it; above, no section is."""
-_RULES = ((0.02, 5), (0.06, 9), (np.inf, 21))
-"""Up to which blur how many places of a Gauss-Hermite quadrature are enough."""
+_SMOOTH, _FEW = 0.02, 5
+"""Up to which blur a Gauss-Hermite quadrature of so many places is enough."""
+_FINE = 0.015
+"""Distance of a quadrature's places in widths, else."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smeared:
     """A section smeared over the noise, once a width along the ridge.
 
-    values (m, cells + 1, 3) as kernels.smeared has them, between -reach and reach; blur, steepness (m,): noise
+    values (m, cells + 1, 6) as kernels.smeared has them, between -reach and reach; blur, steepness (m,): noise
     in widths, apex heights in widths there; even: 0 where points lie evenly over the base, 1 where over the
     surface.
     """
@@ -70,8 +73,24 @@ def smear(section: Section, terms: Array, noise: float, even: float) -> Smeared:
     return Smeared(section, values, reach, blur, steepness, even)
 
 
+def log_likelihood(
+    points: Array, terms: Array, section: Section, noise: float, even: float, strays: float, span: float
+) -> float:
+    """Of the heights of points (m, 3) in path coordinates where they are seen: noisy, with a share of strays
+    that lie evenly over `span`."""
+    nodes = np.arange(len(terms))
+    a, b, c, e, h, w = (np.interp(points[:, 0], nodes, terms[:, k]) for k in range(terms.shape[1]))
+    y = points[:, 1]
+    own, sizes = np.column_stack([y - e, points[:, 2] - a - y * (b + c * y)]), np.column_stack([h, w])
+    rule = _rule(float(np.clip(noise / np.median(w), _LEAST_BLUR, _MOST_BLUR)))
+    return float(kernel(own, section.table, sizes, even, *rule, noise, strays, span))
+
+
 def _rule(blur: float) -> tuple[Array, Array]:
     """Places and shares of a quadrature over the standard normal distribution."""
-    count = next(n for most, n in _RULES if blur <= most)
-    places, shares = np.polynomial.hermite.hermgauss(count)
-    return np.asarray(np.sqrt(2.0) * places), np.asarray(shares / np.sqrt(np.pi))
+    if blur <= _SMOOTH:
+        places, shares = np.polynomial.hermite.hermgauss(_FEW)
+        return np.asarray(np.sqrt(2.0) * places), np.asarray(shares / np.sqrt(np.pi))
+    places = np.linspace(-_REACH, _REACH, 2 * int(np.ceil(_REACH * max(blur / _FINE, 2.0))) + 1)
+    shares = np.exp(-0.5 * places**2)
+    return places, np.asarray(shares / shares.sum())

@@ -32,11 +32,10 @@ def cell_sums(
         y = points[i, 1]
         _, there = terms_at(terms, points[i, 0])
         m = np.int64(points[i, 0] / stride + 0.5)
-        base, f, _, _, eta, inverse = seen_at(y, there, values[m], reach)
-        per_scale = inverse / scale
-        goal = (points[i, 2] - base) * per_scale
+        r, far, _, growth, _, _, eta, per_scale = seen_at(y, points[i, 2], there, values[m], reach, scale)
         raised = there[4] * per_scale
-        weight = share_of_surface(goal - f * raised, inverse, stray)
+        goal = r + growth * raised
+        weight = share_of_surface(far, per_scale * scale, stray)
         row[0], row[1], row[2] = per_scale, y * per_scale, y * y * per_scale
         for k in range(BASE):
             base_right[k] += weight * goal * row[k]
@@ -54,7 +53,9 @@ def cell_sums(
 
 
 @njit(**OPTIONS)
-def spline_sums(sums: Floats, basis: Floats, base_matrix: Floats, base_right: Floats) -> tuple[Floats, Floats]:
+def spline_sums(
+    sums: Floats, basis: Floats, base_matrix: Floats, base_right: Floats
+) -> tuple[Floats, Floats]:
     """Normal equations (n + 3, n + 3), (n + 3,) of a spline with n coefficients and the base's changes.
 
     sums (m, cells, 5) as `cell_sums` has them; basis (m, cells, n): values of the spline's functions there.

@@ -17,7 +17,9 @@ from ridgefeature.kernels.residual import INNER, OPTIONS, split
 
 Floats = NDArray[np.float64]
 Columns = tuple[Floats, Floats, Floats, Floats]
-VALUE, RATE, SPREAD = range(3)
+VALUE, RATE, SPREAD, LOW, HIGH, GROWTH = range(6)
+_NEAR = 2.5
+"""Deviations of the noise within which heights are those of the surface there."""
 
 
 @njit(**INNER)
@@ -37,14 +39,14 @@ def _section_at(eta: float, own: Columns) -> tuple[float, float, float]:
 
 
 @njit(**INNER)
-def _crowded(slope: float, bow: float, steepness: float, even: float) -> tuple[float, float]:
-    """How many points lie over a unit of the base there, and how that changes with eta.
+def _crowded(slope: float, steepness: float, even: float) -> tuple[float, float]:
+    """How many points lie over a unit of the base there, and how that changes with the section's slope.
 
     even: 0 where they lie evenly over the base, 1 where evenly over the surface.
     """
     square = steepness * steepness
     stretch = math.sqrt(1.0 + square * slope * slope)
-    return 1.0 + even * (stretch - 1.0), even * square * slope * bow / stretch
+    return 1.0 + even * (stretch - 1.0), even * square * slope / stretch
 
 
 @njit(**OPTIONS)
@@ -58,34 +60,42 @@ def smeared(
     reach: float,
     cells: int,
 ) -> Floats:
-    """Mean height, its slope, and variance by that of the noise (m, cells + 1, 3), for m amounts of noise.
+    """What is seen of a section (m, cells + 1, 6), for m amounts of noise.
 
-    Each at cells + 1 even places from -reach to reach. table: as in Section; blur (m,): standard deviations
+    Mean height, its slope, variance by that of the noise, the least and largest height within 2.5
+    deviations, and the derivative of the mean with the apex height, by which steep places are crowded; at cells + 1 even places from -reach to reach. table: as in Section; blur (m,): standard deviations
     of the noise; steepness (m,): apex heights in widths; even: as in `_crowded`; abscissae, shares (k,): of a
     quadrature over the standard normal distribution.
     """
     own = split(table)
-    out = np.zeros((blur.size, cells + 1, 3))
+    out = np.zeros((blur.size, cells + 1, 6))
     for m in range(blur.size):
         square = 1.0 / (blur[m] * blur[m])
         for i in range(cells + 1):
             eta = (2.0 * i / cells - 1.0) * reach
             level = _section_at(eta, own)[0]
-            d = d1 = n = n1 = v = 0.0
+            d = d1 = n = n1 = v = g = g1 = low = high = 0.0
             for k in range(abscissae.size):
                 f, slope, bow = _section_at(eta + blur[m] * abscissae[k], own)
-                dense, change = _crowded(slope, bow, steepness[m], even)
-                dense, change = shares[k] * dense, shares[k] * change
+                dense, steeper = _crowded(slope, steepness[m], even)
+                dense, steeper = shares[k] * dense, shares[k] * steeper
+                change = steeper * bow
                 f -= level  # so that no digits are lost where there is little noise
                 d += dense
                 d1 += change
                 n += dense * f
                 n1 += change * f + dense * slope
                 v += dense * f * f
+                g += steeper * slope
+                g1 += steeper * slope * f
+                if abs(abscissae[k]) < _NEAR:
+                    low, high = min(low, f), max(high, f)
             mean = n / d
             out[m, i, VALUE] = level + mean
             out[m, i, RATE] = (n1 - mean * d1) / d
             out[m, i, SPREAD] = max(v / d - mean * mean, 0.0) * square
+            out[m, i, GROWTH] = level + mean + (g1 - mean * g) / d
+            out[m, i, LOW], out[m, i, HIGH] = level + low, level + high
     return out
 
 
@@ -101,45 +111,98 @@ def smeared_basis(
     spans: int,
     wider: float,
 ) -> Floats:
-    """Means (n, spans + 3) of cubic B-splines on even knots over `wider` widths, at places (n,); see `smeared`."""
+    """How the mean height at places (n,) changes with the coefficients (n, spans + 3) of a section.
+
+    They are those of cubic B-splines on even knots over `wider` widths; all else is as for `smeared`.
+    """
     own = split(table)
     out = np.zeros((places.size, spans + 3))
+    per_eta = spans / wider
     for i in range(places.size):
-        d = 0.0
+        d = mean = 0.0
+        for k in range(abscissae.size):
+            f, slope, _ = _section_at(places[i] + blur * abscissae[k], own)
+            dense = shares[k] * _crowded(slope, steepness, even)[0]
+            d += dense
+            mean += dense * f
+        mean /= d
         for k in range(abscissae.size):
             eta = places[i] + blur * abscissae[k]
-            _, slope, bow = _section_at(eta, own)
-            dense = shares[k] * _crowded(slope, bow, steepness, even)[0]
-            d += dense
             place = (eta / wider + 0.5) * spans
             if not 0.0 <= place < spans:
                 continue
+            f, slope, _ = _section_at(eta, own)
+            dense, steeper = _crowded(slope, steepness, even)
+            dense, steeper = shares[k] * dense / d, shares[k] * steeper * (f - mean) * per_eta / d
             first = np.int64(place)
             t = place - first
             s = 1.0 - t
-            out[i, first] += dense * s * s * s / 6.0
-            out[i, first + 1] += dense * (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0
-            out[i, first + 2] += dense * (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0
-            out[i, first + 3] += dense * t * t * t / 6.0
-        out[i] /= d
+            row = out[i, first:]
+            row[0] += dense * s * s * s / 6.0 - steeper * 0.5 * s * s
+            row[1] += dense * (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0 + steeper * t * (1.5 * t - 2.0)
+            row[2] += dense * (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0 - steeper * s * (1.5 * s - 2.0)
+            row[3] += dense * t * t * t / 6.0 + steeper * 0.5 * t * t
     return out
 
 
 @njit(**INNER)
-def smeared_at(eta: float, values: Floats, reach: float) -> tuple[float, float, float, float]:
-    """Mean height, its slope and second derivative, and variance by that of the noise; values (cells + 1, 3)."""
+def smeared_at(eta: float, values: Floats, reach: float) -> tuple[float, float, float, float, float, float, float]:
+    """Mean height, slope, second derivative, variance by that of the noise, least and largest height, and
+    derivative with the apex height; values (cells + 1, 6) as `smeared` has them."""
     cells = values.shape[0] - 1
     step = 2.0 * reach / cells
     place = (eta + reach) / step
     if not 0.0 <= place < cells:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     i = np.int64(place)
     t = place - i
     u = 1.0 - t
-    one, other = values[i, RATE], values[i + 1, RATE]
+    here, after = values[i], values[i + 1]
+    one, other = here[RATE], after[RATE]
     f = (
-        u * u * (1.0 + 2.0 * t) * values[i, VALUE]
-        + t * t * (3.0 - 2.0 * t) * values[i + 1, VALUE]
+        u * u * (1.0 + 2.0 * t) * here[VALUE]
+        + t * t * (3.0 - 2.0 * t) * after[VALUE]
         + step * t * u * (u * one - t * other)
     )
-    return f, u * one + t * other, (other - one) / step, u * values[i, SPREAD] + t * values[i + 1, SPREAD]
+    return (
+        f,
+        u * one + t * other,
+        (other - one) / step,
+        u * here[SPREAD] + t * after[SPREAD],
+        u * here[LOW] + t * after[LOW],
+        u * here[HIGH] + t * after[HIGH],
+        u * here[GROWTH] + t * after[GROWTH],
+    )
+
+
+@njit(**OPTIONS)
+def log_likelihood(
+    points: Floats,
+    table: Floats,
+    sizes: Floats,
+    even: float,
+    abscissae: Floats,
+    shares: Floats,
+    noise: float,
+    strays: float,
+    span: float,
+) -> float:
+    """Of points' heights where they are seen: of a section whose points are noisy, and even strays over `span`.
+
+    points (n, 2): y from the middle between the feet, and z from the base there; sizes (n, 2): height and
+    width there; the rest as for `smeared`, but the noise in the unit of the points.
+    """
+    own = split(table)
+    total, least = 0.0, strays / span
+    density = (1.0 - strays) / (math.sqrt(2.0 * math.pi) * noise)
+    for i in range(points.shape[0]):
+        h, w = sizes[i, 0], sizes[i, 1]
+        d = n = 0.0
+        for k in range(abscissae.size):
+            f, slope, _ = _section_at((points[i, 0] + noise * abscissae[k]) / w, own)
+            dense = shares[k] * _crowded(slope, h / w, even)[0]
+            r = (points[i, 1] - h * f) / noise
+            d += dense
+            n += dense * math.exp(-0.5 * min(r * r, 1e3))
+        total += math.log(least + density * n / d)
+    return total

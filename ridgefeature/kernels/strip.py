@@ -155,15 +155,27 @@ def terms_at(terms: Floats, s: float) -> tuple[int, Terms]:
 
 
 @njit(**INNER)
-def seen_at(y: float, terms: Terms, values: Floats, reach: float) -> tuple[float, float, float, float, float, float]:
-    """Where points seen at y are: base, mean height of the section, its slope and second derivative by place in
-    widths, that place, and 1 over the standard deviation of heights there in that of the noise."""
+def seen_at(
+    y: float, z: float, terms: Terms, values: Floats, reach: float, scale: float
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """A point against where points seen at y are expected.
+
+    Its distance from the mean height over the deviation of heights there, and from the nearest height that the
+    surface has near by over the noise, if that is less; the mean height, its derivative with the apex height,
+    its slope and second derivative by place in widths, that place, and 1 over the deviation of heights.
+    """
     a, b, c, e, h, w = terms
     eta = (y - e) / w
-    f, rate, bow, spread = smeared_at(eta, values, reach)
+    f, rate, bow, spread, low, high, growth = smeared_at(eta, values, reach)
     tilt, steep = b + 2.0 * c * y, h / w
     variance = 1.0 + tilt * tilt + steep * (2.0 * tilt * rate + steep * spread)
-    return a + y * (b + c * y), f, rate, bow, eta, 1.0 / math.sqrt(max(variance, 0.1))
+    per_scale = 1.0 / (scale * math.sqrt(max(variance, 0.1)))
+    z -= a + y * (b + c * y)
+    r = (z - h * f) * per_scale
+    # Beside a steep flank points are high or low, and few as high as the mean: those are no strays.
+    above, below = (high, low) if h >= 0.0 else (low, high)
+    out = max(max(z - h * above, h * below - z), 0.0) / scale
+    return r, min(out, abs(r)), f, growth, rate, bow, eta, per_scale
 
 
 @njit(**INNER)
@@ -173,32 +185,33 @@ def share_of_surface(r: float, inverse: float, stray: float) -> float:
 
 
 @njit(**OPTIONS)
-def offsets(points: Floats, terms: Floats, seen: Seen) -> Floats:
+def offsets(points: Floats, terms: Floats, seen: Seen, scale: float) -> tuple[Floats, Floats]:
     """Distances (m,) of points (m, 3) in path coordinates from where they are expected; terms (nodes, 6).
 
-    They are heights in units of how much these scatter by the noise, times the noise: near a surface that is
-    nearly flat they are distances from it. seen: the smeared section (kernels.smeared) once a `stride` of
-    nodes, its reach, and that stride.
+    They are heights in units of how much these scatter by the noise, times the noise scale: near a surface
+    that is nearly flat they are distances from it. The second ones tell strays: they are less where the
+    surface is as high near by. seen: the smeared section (kernels.smeared) once a `stride` of nodes, its
+    reach, and that stride.
     """
     values, reach, stride = seen
-    out = np.empty(points.shape[0])
+    out, far = np.empty(points.shape[0]), np.empty(points.shape[0])
     for i in range(points.shape[0]):
         _, there = terms_at(terms, points[i, 0])
         own = values[np.int64(points[i, 0] / stride + 0.5)]
-        base, f, _, _, _, inverse = seen_at(points[i, 1], there, own, reach)
-        out[i] = (points[i, 2] - base - there[4] * f) * inverse
-    return out
+        found = seen_at(points[i, 1], points[i, 2], there, own, reach, scale)
+        out[i], far[i] = scale * found[0], scale * found[1]
+    return out, far
 
 
 @njit(**OPTIONS)
 def mixture(
-    r: Floats, scale: float, share: float, span: float, least: float, rounds: int
+    r: Floats, far: Floats, scale: float, share: float, span: float, least: float, rounds: int
 ) -> tuple[float, float, float]:
     """Noise scale and share of strays, and the density of strays over that of the others at their middle.
 
     Residuals r (n,) are a mixture of a normal distribution and strays spread evenly over `span` (Dempster,
-    Laird and Rubin 1977), to begin with of this scale and this share of strays. least: of the
-    scale.
+    Laird and Rubin 1977), to begin with of this scale and this share of strays. far (n,): what tells strays,
+    up to |r|. least: of the scale.
     """
     stray = 0.0
     for _ in range(rounds):
@@ -206,7 +219,7 @@ def mixture(
         total = square = 0.0
         inverse = 1.0 / scale
         for i in range(r.size):
-            weight = share_of_surface(r[i] * inverse, 1.0, stray)
+            weight = share_of_surface(far[i] * inverse, 1.0, stray)
             total += weight
             square += weight * r[i] * r[i]
         scale = max(math.sqrt(square / max(total, 1.0)), least)
@@ -235,19 +248,18 @@ def information(
         j, there = terms_at(terms, points[i, 0])
         h, w = there[4], there[5]
         m = np.int64(points[i, 0] / stride + 0.5)
-        base, f, rate, bow, eta, inverse = seen_at(y, there, values[m], reach)
-        inverse_scale = inverse / scale
-        r = (points[i, 2] - base - h * f) * inverse_scale
-        weight = share_of_surface(r, inverse, stray)
+        r, far, f, growth, rate, bow, eta, per_scale = seen_at(y, points[i, 2], there, values[m], reach, scale)
+        weight = share_of_surface(far, per_scale * scale, stray)
         sums[0] += 1.0
         sums[1] += weight
         sums[2] += weight * weight * r * r
-        sums[3] += weight - weight * (1.0 - weight) * r * r
+        sums[3] += weight - weight * (1.0 - weight) * far * far
         blur = scale / w
         row[A], row[B], row[C] = 1.0, y, y * y
-        row[E], row[H], row[W] = -h * rate / w, f, -h * (rate * eta + bow * blur * blur) / w
+        row[E], row[H] = -h * rate / w, growth
+        row[W] = -h * (rate * eta + bow * blur * blur + growth - f) / w
         for p in range(TERMS):
-            row[p] *= inverse_scale
+            row[p] *= per_scale
             right[j, p] += weight * r * row[p]
             for q in range(p + 1):
                 matrix[j, p, q] += weight * row[p] * row[q]

@@ -1,0 +1,112 @@
+"""The noise of a ridge's points: how far they scatter, how many are strays, how they lie, how correlated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.strip import TERMS, E, H, W, mixture, offsets
+from ridgefeature.section import Section
+from ridgefeature.smearing import smear
+
+Array = NDArray[np.float64]
+
+EXACT = 5e-3
+"""Least noise, in apex heights: splines are no nearer to a real ridge, and what they miss is no stray."""
+_FIRST_MIXTURE = 15
+_ENOUGH = 5000
+"""Points that tell the noise well enough to begin with."""
+_FEWEST = 60
+"""Points beyond the feet that tell the noise by themselves."""
+_BESIDE = 0.7
+"""Distance from the spine in widths up to which points are counted to tell how evenly they lie."""
+_SOME_STRAYS = 0.05
+_BLOCK = 5
+"""Nodes over which noise may be correlated."""
+_MEDIAN = 0.89
+"""Median of chi-square with six degrees of freedom, by its mean."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Distances of points from the surface: normal, and those of strays, spread evenly."""
+
+    scale: float
+    """Standard deviation of those that are no strays."""
+    strays: float
+    """Share of points that are strays."""
+    density: float
+    """Of strays, by that of the others at their middle."""
+    span: float
+    """Distances that strays may have, in all."""
+    even: float
+    """0 where points lie evenly over the base, 1 where evenly over the surface."""
+    blur: float
+    """Standard deviation of the places of points: that of heights, without what a wrong section adds."""
+
+    @property
+    def told(self) -> tuple[float, float]:
+        """As the kernels take it."""
+        return self.scale, self.density
+
+
+def first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> Noise:
+    """The noise as some of the points tell it."""
+    points = points[:: 1 + len(points) // _ENOUGH]
+    seen = smear(section, terms, 0.0, 0.0).told
+    distances, far = offsets(points, terms, seen, EXACT * h)
+    scale = max(1.4826 * float(np.median(np.abs(distances))), EXACT * h)
+    span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
+    scale, strays, density = mixture(distances, far, scale, _SOME_STRAYS, span, EXACT * h, _FIRST_MIXTURE)
+    blur = blur_of(points, terms, distances, scale, span, EXACT * h)
+    return Noise(scale, strays, density, span, _evenness(points, terms, section, blur), blur)
+
+
+def blur_of(points: Array, terms: Array, distances: Array, scale: float, span: float, least: float) -> float:
+    """The noise as points beyond the feet tell it, but no more than all of them do."""
+    nodes = np.arange(len(terms))
+    aside = np.abs(points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E]))
+    beyond = distances[aside > 0.5 * np.interp(points[:, 0], nodes, terms[:, W])]
+    if len(beyond) < _FEWEST:
+        return scale
+    return min(mixture(beyond, np.abs(beyond), scale, _SOME_STRAYS, span, least, _FIRST_MIXTURE)[0], scale)
+
+
+def _evenness(points: Array, terms: Array, section: Section, noise: float) -> float:
+    """0 where points lie evenly over the base, 1 where evenly over the surface, flanks too."""
+    h, w = float(np.median(np.abs(terms[:, H]))), float(np.median(terms[:, W]))
+
+    def stretched(eta: Array) -> Array:
+        return np.asarray(np.sqrt(1.0 + (h / w * section(eta, 1)) ** 2))
+
+    nodes = np.arange(len(terms))
+    width = np.interp(points[:, 0], nodes, terms[:, W])
+    eta = (points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E])) / width
+    places = np.linspace(-1.0, 1.0, 401)
+    dense = stretched(places)
+    if noise > 0:
+        spread = np.exp(-0.5 * ((places[:, None] - places) * w / noise) ** 2)
+        dense = (spread @ dense) / spread.sum(axis=1)
+    inner = np.abs(places) < _BESIDE
+    found = np.interp(eta[np.abs(eta) < _BESIDE], places, dense).mean()
+    on_base, on_surface = dense[inner].mean(), (dense[inner] ** 2).mean() / dense[inner].mean()
+    return float(np.clip((found - on_base) / max(on_surface - on_base, 1e-12), 0.0, 1.0))
+
+
+def inflation_of(matrix: Array, right: Array) -> float:
+    """Variance of sums over blocks of nodes by that of independent noise, 1 or more."""
+    n = len(matrix) // _BLOCK * _BLOCK
+    whole = matrix[:n].reshape(-1, _BLOCK, TERMS, TERMS).sum(axis=1)
+    pull = right[:n].reshape(-1, _BLOCK, TERMS).sum(axis=1)
+    sizes = np.sqrt(np.einsum("nii->ni", whole))
+    good = (sizes > 0).all(axis=1)
+    if not good.any():
+        return 1.0
+    scaled = whole[good] / (sizes[good, :, None] * sizes[good, None])
+    values, vectors = np.linalg.eigh(scaled)
+    seen = np.einsum("nij,ni->nj", vectors, pull[good] / sizes[good]) ** 2
+    told = values > 1e-6
+    each = np.where(told, seen / np.maximum(values, 1e-6), 0.0).sum(axis=1) / told.sum(axis=1)
+    return max(1.0, float(np.median(each)) / _MEDIAN)

@@ -1,0 +1,51 @@
+"""How the section of a whole ridge is found together with its other terms."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.free_section import FREE, LEARNED, SPANS, WIDER, free_section, trimmed
+from ridgefeature.kernels.strip import E, W
+from ridgefeature.noise import Noise
+from ridgefeature.section import Section, box
+from ridgefeature.smearing import smear
+
+Array = NDArray[np.float64]
+
+
+def shaped(
+    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
+) -> tuple[Section, Array]:
+    """The section and terms (n, 6), or a free section and its terms where that is better beyond doubt; a box is never kept.
+
+    points (m, 3) in path coordinates and terms as in kernels.strip; inflation: variance of sums over
+    neighbouring points, by what it would be if their noise was independent.
+    """
+    price = np.log(len(points))
+    seen = smear(section, terms, noise.blur, noise.even)
+    wider = 1.0 if section.name == FREE else WIDER
+    found = free_section(points, terms, seen, noise.told, SPANS, inflation * price, wider)
+    if found is None or (section is not box() and found.gain / inflation < price * found.freedom):
+        return section, terms
+    return found.applied(terms)
+
+
+def between_feet(
+    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
+) -> tuple[Section, Array]:
+    """A free section and its terms between its feet, where it is fitted again; arguments as for `shaped`."""
+    section, middle, breadth = trimmed(section)
+    terms = terms.copy()
+    terms[:, E] += middle * terms[:, W]
+    terms[:, W] *= breadth
+    seen, price = smear(section, terms, noise.blur, noise.even), inflation * np.log(len(points))
+    found = free_section(points, terms, seen, noise.told, section.spans, price, 1.0)
+    return (section, terms) if found is None else found.applied(terms, LEARNED)
+
+
+def with_half_height_width(terms: Array, before: Section, section: Section) -> Array:
+    """Terms (n, 6) of a section that is as wide at half height as the one before."""
+    out = terms.copy()
+    out[:, W] *= before.half_height_width / section.half_height_width
+    return out
