@@ -39,9 +39,11 @@ MOST_POINTS, SOME_POINTS = 300_000, 20_000
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
 _TRIAL_ROUNDS = 4
-"""Of each of the two sections that a fit may begin with."""
-_TELLING = 3000
-"""Points that tell which of two sections is likelier."""
+"""Of each of the sections that a fit may begin with."""
+_TELLING = 5000
+"""As many points tell which it is."""
+_STEEP = 0.4
+"""Height by width from which on it matters how a fit begins."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -87,15 +89,15 @@ def fit_whole(
     path: PathFrame,
     section: Section,
     settings: Settings,
-    weights: Array | None = None,
+    before: Joint | None = None,
     rounds: int = 3,
     flat: bool = False,
     most: int = MOST_POINTS,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
-    weights (6,): of the penalties of an earlier fit, to begin with; None: there was none, and the section may
-    be far off. rounds: at most, of which the last does not change the section any more. flat: the base stays
+    before: an earlier fit, whose noise and smoothness are taken to begin with; None: there was none, and the
+    section may be far off. rounds: at most, of which the last does not change the section any more. flat: the base stays
     as curved across as the path has it. most: about as many points are looked at.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
@@ -103,9 +105,9 @@ def fit_whole(
         return None
     some = points[:: 1 + len(points) // SOME_POINTS]
     shaping = settings.section in ("auto", "learned")
-    state: _State | None = _begun(some, path, section, weights)
-    if weights is None and shaping:
-        state = _likelier(some, path, state, flat)
+    state: _State | None = _begun(some, path, section, before)
+    if before is None and shaping:
+        state = _likeliest(some, path, state, flat)
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         state = _improved(points if last else some, path, state, flat)
@@ -138,13 +140,15 @@ class _State:
         return replace(self, section=section, terms=terms)
 
 
-def _begun(points: Array, path: PathFrame, section: Section, weights: Array | None) -> _State:
+def _begun(points: Array, path: PathFrame, section: Section, before: Joint | None) -> _State:
     h, w = _sizes(path)
-    if weights is None:
-        weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
     terms = np.zeros((len(path.at), TERMS))
     terms[:, H], terms[:, W] = path.height, path.width
-    return _State(terms, section, first_noise(points, terms, section, h, w), weights)
+    if before is None:
+        weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
+        return _State(terms, section, first_noise(points, terms, section, h, w), weights)
+    noise = first_noise(points, terms, section, h, w, before.noise.even)
+    return _State(terms, section, noise, before.smooth.weights)
 
 
 def _sizes(path: PathFrame) -> tuple[float, float]:
@@ -154,26 +158,31 @@ def _sizes(path: PathFrame) -> tuple[float, float]:
     return float(np.median(known)) if len(known) else width, width
 
 
-def _likelier(points: Array, path: PathFrame, state: _State, flat: bool) -> _State | None:
-    """After one round, the ridge with the section that it has or with a box, whichever is likelier."""
-    wider = with_half_height_width(state.terms, state.section, box())
-    other = _State(wider, box(), first_noise(points, wider, box(), *_sizes(path)), state.weights)
+def _likeliest(points: Array, path: PathFrame, state: _State, flat: bool) -> _State | None:
+    """After some rounds, the likeliest of steep ridges: with the section that it has or with a box, and points
+    evenly over the base or over the surface."""
+    h, w = _sizes(path)
+    if h < _STEEP * w:
+        return state
+    points = points[:: 1 + len(points) // _TELLING]
     best, kept = -np.inf, None
-    for start in (state, other):
-        found: _State | None = start
-        for _ in range(_TRIAL_ROUNDS):
-            found = _improved(points, path, found, flat)
-        if found is not None and (chance := _chance(points, found)) > best:
-            best, kept = chance, found
+    for section in (state.section, box()):
+        terms = with_half_height_width(state.terms, state.section, section)
+        for even in (0.0, 1.0):
+            noise = first_noise(points, terms, section, h, w, even)
+            found: _State | None = _State(terms, section, noise, state.weights)
+            for _ in range(_TRIAL_ROUNDS):
+                found = _improved(points, path, found, flat)
+            if found is not None and (chance := _chance(points, found)) > best:
+                best, kept = chance, found
     return kept
 
 
 def _chance(points: Array, state: _State) -> float:
     """Log likelihood of the points' heights."""
     noise = state.noise
-    points = points[:: 1 + len(points) // _TELLING]
     told = noise.blur, noise.even, noise.strays, noise.span
-    return log_likelihood(points, state.terms, state.section, *told) / len(points)
+    return log_likelihood(points, state.terms, state.section, *told)
 
 
 def _improved(points: Array, path: PathFrame, state: _State | None, flat: bool) -> _State | None:

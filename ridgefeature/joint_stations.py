@@ -63,18 +63,18 @@ def refitted(
     laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
         laid, intervals = _between_ends(grid, laid, first, open_ends, settings, flat)
-    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first.smooth.weights, flat)
+    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
         return Refit(laid, first, intervals)
     return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals)
 
 
 def _fit(
-    grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None, flat: bool
+    grid: Grid, path: PathFrame, section: Section, settings: Settings, before: Joint | None, flat: bool
 ) -> Joint | None:
     """The whole fit along a path, if it is sound."""
-    rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if weights is None else (_LAST_ROUNDS, MOST_POINTS)
-    joint = fit_whole(grid, path, section, settings, weights, rounds, flat, most)
+    rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if before is None else (_LAST_ROUNDS, MOST_POINTS)
+    joint = fit_whole(grid, path, section, settings, before, rounds, flat, most)
     return joint if joint is not None and _sound(joint) else None
 
 
@@ -91,7 +91,7 @@ def _between_ends(
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
     fixed = replace(settings, section="bell")  # kept as it is
-    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2, flat, SOME_POINTS)
+    wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None
     start, end = ends_of(wide, 0.0, length, open_ends)

@@ -52,8 +52,10 @@ class Noise:
         return self.scale, self.density
 
 
-def first_noise(points: Array, terms: Array, section: Section, h: float, w: float) -> Noise:
-    """The noise as some of the points tell it."""
+def first_noise(
+    points: Array, terms: Array, section: Section, h: float, w: float, even: float | None = None
+) -> Noise:
+    """The noise as some of the points tell it; even: how they lie, if that is known."""
     points = points[:: 1 + len(points) // _ENOUGH]
     seen = smear(section, terms, 0.0, 0.0).told
     distances, far = offsets(points, terms, seen, EXACT * h)
@@ -61,7 +63,9 @@ def first_noise(points: Array, terms: Array, section: Section, h: float, w: floa
     span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
     scale, strays, density = mixture(distances, far, scale, _SOME_STRAYS, span, EXACT * h, _FIRST_MIXTURE)
     blur = blur_of(points, terms, distances, scale, span, EXACT * h)
-    return Noise(scale, strays, density, span, _evenness(points, terms, section, blur), blur)
+    if even is None:
+        even = _evenness(points, terms, section, blur)
+    return Noise(scale, strays, density, span, even, blur)
 
 
 def blur_of(points: Array, terms: Array, distances: Array, scale: float, span: float, least: float) -> float:
