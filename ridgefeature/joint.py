@@ -110,7 +110,8 @@ def fit_whole(
         state = _likeliest(some, path, state, flat)
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
-        state = _improved(points if last else some, path, state, flat)
+        left = rounds - 1 - n if before is None and not last else 0
+        state = _improved(points if last else some, path, state, flat, left)
         if state is None:
             return None
         if last:
@@ -171,8 +172,8 @@ def _likeliest(points: Array, path: PathFrame, state: _State, flat: bool) -> _St
         for even in (0.0, 1.0):
             noise = first_noise(points, terms, section, h, w, even)
             found: _State | None = _State(terms, section, noise, state.weights)
-            for _ in range(_TRIAL_ROUNDS):
-                found = _improved(points, path, found, flat)
+            for n in range(_TRIAL_ROUNDS):
+                found = _improved(points, path, found, flat, _TRIAL_ROUNDS - n)
             if found is not None and (chance := _chance(points, found)) > best:
                 best, kept = chance, found
     return kept
@@ -185,11 +186,14 @@ def _chance(points: Array, state: _State) -> float:
     return log_likelihood(points, state.terms, state.section, *told)
 
 
-def _improved(points: Array, path: PathFrame, state: _State | None, flat: bool) -> _State | None:
-    """All terms fitted again; None where nothing finite came of it."""
+def _improved(points: Array, path: PathFrame, state: _State | None, flat: bool, left: int) -> _State | None:
+    """All terms fitted again; None where nothing finite came of it.
+
+    left: rounds still to come: until then what the terms miss is no stray yet.
+    """
     if state is None:
         return None
-    matrix, goal, noise, gain = _linearised(points, state, EXACT * _sizes(path)[0])
+    matrix, goal, noise, gain = _linearised(points, state, EXACT * 2.0**left * _sizes(path)[0])
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = inflation_of(gain * matrix, gain * goal) if state.smooth is not None else state.inflation
