@@ -59,6 +59,9 @@ def section_sums(
             index[k] = span + k
         for k in range(7):
             right[index[k]] += weight * goal * row[k]
-            for m in range(7):
+            for m in range(k + 1):
                 matrix[index[k], index[m]] += weight * row[k] * row[m]
+    for k in range(n):
+        for m in range(k):
+            matrix[m, k] = matrix[k, m]
     return matrix, right
