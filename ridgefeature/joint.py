@@ -138,7 +138,9 @@ def fit_whole(
     shaping = settings.section in ("auto", "learned")
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
-        matrix, goal, noise, gain = _linearised(points if last else some, terms, section, noise, _EXACT * h)
+        matrix, goal, noise, gain = _linearised(
+            points if last else some, some, terms, section, noise, _EXACT * h
+        )
         if not np.isfinite(matrix).all() or not np.isfinite(gain):
             return None
         if n > 0:
@@ -163,10 +165,13 @@ def fit_whole(
 
 
 def _linearised(
-    points: Array, terms: Array, section: Section, noise: Noise, least: float
+    points: Array, some: Array, terms: Array, section: Section, noise: Noise, least: float
 ) -> tuple[Array, Array, Noise, float]:
-    """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood."""
-    distances = offsets(points, terms, section.table)
+    """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood.
+
+    some: those of the points that tell the noise.
+    """
+    distances = offsets(some, terms, section.table)
     scale, strays, density = mixture(distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
     matrix, right, sums = information(points, terms, section.table, scale, density, noise.even)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))

@@ -1,4 +1,4 @@
-"""The points along a path, from a cell grid (its arrays are those of grid.py), box after box of a few nodes."""
+"""The points along a path, from a cell grid (arrays as in grid.py), box after box of a few nodes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ _PROBES = 6
 def boxes_around(
     corners: Floats, origin: Floats, tangent: Floats, left: Floats, normal: Floats, together: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Boxes around runs of so many stretches between nodes: centres (m, 3), axes (m, 3, 3), half sizes (m, 3).
+    """Boxes around runs of so many stretches between nodes: centres (m, 3), axes (m, 3, 3), half sizes
+    (m, 3).
 
     corners (nodes, k, 3): what the points near each node lie between. The axes are those of the node in the
     middle of the run.

@@ -193,9 +193,9 @@ def box_points(
 
 @njit(cache=True)
 def _chosen(block: int, every: int) -> int:
-    """The row that is chosen of a block of so many: one whose place within the block goes by the golden ratio.
+    """The row that is chosen of a block of so many; its place in the block goes by the golden ratio.
 
-    Multiples of it are spread evenly, and points of a regular scan are not chosen in stripes.
+    Multiples of that are spread evenly, and points of a regular scan are not chosen in stripes.
     """
     return block * every + (((block * 2654435769) & 0xFFFFFFFF) * every >> 32)
 
