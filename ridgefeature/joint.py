@@ -116,12 +116,13 @@ def fit_whole(
     rounds: int = 3,
     flat: bool = False,
     most: int = MOST_POINTS,
+    noise: Noise | None = None,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
-    weights (6,): of the penalties of an earlier fit, to begin with. rounds: at most, of which the last does
-    not change the section any more. flat: the base stays as curved across as the path has it. most: about
-    as many points are looked at.
+    weights (6,) of the penalties, and noise: of an earlier fit, to begin with. rounds: at most, of which the
+    last does not change the section any more. flat: the base stays as curved across as the path has it.
+    most: about as many points are looked at.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
     if len(points) < _FEWEST:
@@ -134,7 +135,7 @@ def fit_whole(
     terms[:, H], terms[:, W] = path.height, path.width
     first, basis = basis_at(path.coefficients, path.knots)
     middle, wanted = 0.5 * (path.knots[1:] + path.knots[:-1]), _wanted(path)
-    noise, inflation = _first_noise(some, terms, section, h, w), 1.0
+    noise, inflation = noise or _first_noise(some, terms, section, h, w), 1.0
     shaping = settings.section in ("auto", "learned")
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)

@@ -55,7 +55,7 @@ def refitted(
     open_ends: which ends may move, further out or back.
     """
     flat = settings.flat
-    first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
+    first = _fit(grid, path_frame(stations, closed), section, settings, flat)
     if first is None:
         return Refit(stations)
     if not stations.curvature.any() and first.bent < _BENT:
@@ -64,18 +64,21 @@ def refitted(
     laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
         laid, intervals = _between_ends(grid, laid, first, open_ends, settings, flat)
-    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first.smooth.weights, flat)
+    joint = _fit(grid, path_frame(laid, closed), first.section, settings, flat, first)
     if joint is None:
         return Refit(laid, first, intervals)
     return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals)
 
 
 def _fit(
-    grid: Grid, path: PathFrame, section: Section, settings: Settings, weights: Array | None, flat: bool
+    grid: Grid, path: PathFrame, section: Section, settings: Settings, flat: bool, before: Joint | None = None
 ) -> Joint | None:
-    """The whole fit along a path, if it is sound, its section between its feet."""
-    rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if weights is None else (_LAST_ROUNDS, MOST_POINTS)
-    joint = fit_whole(grid, path, section, settings, weights, rounds, flat, most)
+    """The whole fit along a path, if it is sound, its section between its feet; before: an earlier fit."""
+    if before is None:
+        joint = fit_whole(grid, path, section, settings, None, _FIRST_ROUNDS, flat, SOME_POINTS)
+    else:
+        known = before.smooth.weights, _LAST_ROUNDS, flat, MOST_POINTS, before.noise
+        joint = fit_whole(grid, path, section, settings, *known)
     if joint is None or not _sound(joint):
         return None
     return joint.between_feet(*trimmed(joint.section)) if joint.section.name == FREE else joint
@@ -94,7 +97,9 @@ def _between_ends(
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
     fixed = replace(settings, section="bell")  # kept as it is
-    wide = fit_whole(grid, path, joint.section, fixed, joint.smooth.weights, 2, flat, SOME_POINTS)
+    wide = fit_whole(
+        grid, path, joint.section, fixed, joint.smooth.weights, 2, flat, SOME_POINTS, joint.noise
+    )
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None
     start, end = ends_of(wide, 0.0, length, open_ends)

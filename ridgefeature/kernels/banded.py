@@ -59,8 +59,8 @@ def inverse_band(factored: Floats) -> Floats:
     """The lower band of the inverse (n, m + 1), by the factor."""
     n, m = factored.shape[0], factored.shape[1] - 1
     out = np.zeros_like(factored)
-    # The inverse's block of the m rows after that at hand, whole, so that sums run along its rows. Row i is the
-    # block's row i modulo m.
+    # The inverse's block of the m rows after that at hand, whole, so that sums run along its rows: row i of
+    # the inverse is row i modulo m there.
     block, column, new = np.zeros((m, m)), np.zeros(m), np.zeros(m)
     for i in range(n - 1, -1, -1):
         pivot = 1.0 / factored[i, 0]
