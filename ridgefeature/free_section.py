@@ -171,7 +171,7 @@ def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: in
 
 @lru_cache(maxsize=8)
 def _nearest_spline(spans: int) -> tuple[Array, Array]:
-    """Sites (m,) from 0 to 1; the map (spans + 3, m) from values there to the nearest spline's coefficients."""
+    """Sites (m,) from 0 to 1; the map (spans + 3, m) from values there to the nearest spline's poles."""
     sites = np.linspace(0.0, 1.0, 8 * spans + 1)
     basis = basis_matrix(np.arange(-3.0, spans + 4.0), 3, spans * sites)
     return sites, np.asarray(np.linalg.pinv(basis), dtype=np.float64)
