@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,15 +205,21 @@ def _humped(
 
 def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: int, wider: float) -> float:
     """By how much the found coefficients are more likely than those nearest to the section before."""
-    sites = np.linspace(0.0, spans, 8 * spans + 1)
-    knots = np.arange(-3.0, spans + 4.0)
-    shape = section((sites / spans - 0.5) * wider)
-    old = np.linalg.lstsq(basis_matrix(knots, 3, sites), shape, rcond=None)[0]
+    sites, nearest = _nearest_spline(spans)
+    old = nearest @ section((sites - 0.5) * wider)
     before = np.concatenate([old, np.zeros(3)])
     # The base is free either way.
     free = slice(spans + 3, None)
     before[free] = np.linalg.solve(matrix[free, free], right[free] - matrix[free, : spans + 3] @ old)
     return _loss(matrix, right, before) - _loss(matrix, right, found)
+
+
+@lru_cache(maxsize=8)
+def _nearest_spline(spans: int) -> tuple[Array, Array]:
+    """Sites (m,) from 0 to 1; the map (spans + 3, m) from values there to the nearest spline's poles."""
+    sites = np.linspace(0.0, 1.0, 8 * spans + 1)
+    basis = basis_matrix(np.arange(-3.0, spans + 4.0), 3, spans * sites)
+    return sites, np.asarray(np.linalg.pinv(basis), dtype=np.float64)
 
 
 def _loss(matrix: Array, right: Array, x: Array) -> float:

@@ -81,7 +81,9 @@ def points_in_box(
     if fault:
         raise ValueError(_BOX_FAULTS[fault] + f", got origin {centre}, axes {frame}, half sizes {half}")
     if cells is None:
-        found, m = window.box_points(grid.points, grid.starts, grid.levels, grid.frame, centre, frame, half)
+        found, m = window.box_points(
+            grid.points, grid.starts, grid.levels, grid.frame, centre, frame, half, 1
+        )
         return found[:m]
     nx, ny = cells
     if nx < 1 or ny < 1:

@@ -97,8 +97,8 @@ def fit_whole(
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     before: an earlier fit, whose noise and smoothness are taken to begin with; None: there was none, and the
-    section may be far off. rounds: at most, of which the last does not change the section any more. flat: the base stays
-    as curved across as the path has it. most: about as many points are looked at.
+    section may be far off. rounds: at most, of which the last does not change the section any more. flat: the
+    base stays as curved across as the path has it. most: about as many points are looked at.
     """
     points = points_along(grid, path, (0.5 + settings.flank) * path.width, most)
     if len(points) < _FEWEST:
@@ -111,7 +111,7 @@ def fit_whole(
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = _improved(points if last else some, path, state, flat, left)
+        state = _improved(points if last else some, some, path, state, flat, left)
         if state is None:
             return None
         if last:
@@ -148,8 +148,7 @@ def _begun(points: Array, path: PathFrame, section: Section, before: Joint | Non
     if before is None:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
         return _State(terms, section, first_noise(points, terms, section, h, w), weights)
-    noise = first_noise(points, terms, section, h, w, before.noise.even)
-    return _State(terms, section, noise, before.smooth.weights)
+    return _State(terms, section, before.noise, before.smooth.weights)
 
 
 def _sizes(path: PathFrame) -> tuple[float, float]:
@@ -173,7 +172,7 @@ def _likeliest(points: Array, path: PathFrame, state: _State, flat: bool) -> _St
             noise = first_noise(points, terms, section, h, w, even)
             found: _State | None = _State(terms, section, noise, state.weights)
             for n in range(_TRIAL_ROUNDS):
-                found = _improved(points, path, found, flat, _TRIAL_ROUNDS - n)
+                found = _improved(points, points, path, found, flat, _TRIAL_ROUNDS - n)
             if found is not None and (chance := _chance(points, found)) > best:
                 best, kept = chance, found
     return kept
@@ -186,14 +185,17 @@ def _chance(points: Array, state: _State) -> float:
     return log_likelihood(points, state.terms, state.section, *told)
 
 
-def _improved(points: Array, path: PathFrame, state: _State | None, flat: bool, left: int) -> _State | None:
+def _improved(
+    points: Array, some: Array, path: PathFrame, state: _State | None, flat: bool, left: int
+) -> _State | None:
     """All terms fitted again; None where nothing finite came of it.
 
-    left: rounds still to come: until then what the terms miss is no stray yet.
+    some: those of the points that tell the noise. left: rounds still to come: until then what the terms miss
+    is no stray yet.
     """
     if state is None:
         return None
-    matrix, goal, noise, gain = _linearised(points, state, EXACT * 2.0**left * _sizes(path)[0])
+    matrix, goal, noise, gain = _linearised(points, some, state, EXACT * 2.0**left * _sizes(path)[0])
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = inflation_of(gain * matrix, gain * goal) if state.smooth is not None else state.inflation
@@ -222,13 +224,13 @@ def _joint(points: Array, some: Array, path: PathFrame, state: _State) -> Joint:
     return Joint(path, smooth, terms, state.section, matrix, goal, counts, noise, inflation, shape)
 
 
-def _linearised(points: Array, state: _State, least: float) -> tuple[Array, Array, Noise, float]:
+def _linearised(points: Array, some: Array, state: _State, least: float) -> tuple[Array, Array, Noise, float]:
     """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood."""
     terms, noise = state.terms, state.noise
     seen = smear(state.section, terms, noise.blur, noise.even).told
-    distances = offsets(points, terms, seen, noise.scale)
+    distances = offsets(some, terms, seen, noise.scale)
     scale, strays, density = mixture(*distances, noise.scale, noise.strays, noise.span, least, _NEXT_MIXTURE)
-    blur = blur_of(points, terms, distances[0], scale, noise.span, least)
+    blur = blur_of(some, terms, distances[0], scale, noise.span, least)
     matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain

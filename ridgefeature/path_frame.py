@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.grid import Grid, points_in_box
+from ridgefeature.grid import Grid
 from ridgefeature.kernels.algebra import rotation_of
-from ridgefeature.kernels.strip import rectified
+from ridgefeature.kernels.path_points import boxes_around, count_along, rectified_along
 from ridgefeature.merge import along
 from ridgefeature.stations import Stations
 
@@ -137,19 +137,16 @@ def _rotation(vector: Array) -> Array:
 def points_along(grid: Grid, path: PathFrame, reach: Array, most: int) -> Array:
     """Coordinates (m, 3) as in kernels.strip of the points up to `reach` (n,) from the path.
 
-    Of more than about `most` only every second, third ... is taken.
+    Of more than about `most` only one of every two, three ... is taken, spread evenly; which of them does not
+    depend on their order.
     """
-    last = len(path.at) - 1
-    runs = [slice(i, min(i + _TOGETHER, last) + 1) for i in range(0, last, _TOGETHER)]
-    corners = _corners(path, reach)
-    boxes = [_box(grid, path, corners, run) for run in runs]
-    every = 1 + sum(len(points) for points, _ in boxes) // most
-    return np.concatenate(
-        [
-            _rectified(path, reach, run, points[::every], centre)
-            for run, (points, centre) in zip(runs, boxes, strict=True)
-        ]
-    )
+    axes = path.tangent, path.left, path.normal
+    boxes = boxes_around(_corners(path, reach), path.origin, *axes, _TOGETHER)
+    cells = grid.starts, grid.levels, grid.frame
+    count = count_along(*cells, *boxes) if len(grid.points) > most else len(grid.points)
+    every = 1 + (count // most if len(grid.points) > most else 0)
+    nodes = path.origin, *axes, path.curvature, reach, path.tall
+    return rectified_along(grid.points, *cells, *boxes, *nodes, _TOGETHER, every, count // every)
 
 
 def _corners(path: PathFrame, reach: Array) -> Array:
@@ -160,30 +157,6 @@ def _corners(path: PathFrame, reach: Array) -> Array:
     left, normal = path.left[:, None], path.normal[:, None]
     aside, over = sides * (1.0 - up * bend), up + 0.5 * bend * sides**2
     return np.asarray(path.origin[:, None] + aside[:, :, None] * left + over[:, :, None] * normal)
-
-
-def _axes(path: PathFrame, run: slice) -> tuple[Array, Array]:
-    """Origin (3,) and axes (3, 3) of the node in the middle of a run of nodes."""
-    middle = (run.start + run.stop - 1) // 2
-    return path.origin[middle], np.stack([path.tangent[middle], path.left[middle], path.normal[middle]])
-
-
-def _box(grid: Grid, path: PathFrame, corners: Array, run: slice) -> tuple[Array, Array]:
-    """The points (m, 3) of the box around a run of nodes, in its frame, and its centre (3,) in the run's."""
-    origin, axes = _axes(path, run)
-    own = (corners[run].reshape(-1, 3) - origin) @ axes.T
-    low, high = own.min(axis=0), own.max(axis=0)
-    centre, half = 0.5 * (low + high), 0.505 * (high - low) + 1e-9 * (high - low).max()
-    return points_in_box(grid, origin + centre @ axes, axes, half, check=False), centre
-
-
-def _rectified(path: PathFrame, reach: Array, run: slice, points: Array, centre: Array) -> Array:
-    origin, axes = _axes(path, run)
-    nodes = (path.origin[run] - origin) @ axes.T - centre
-    tangent, left, normal = (x[run] @ axes.T for x in (path.tangent, path.left, path.normal))
-    return rectified(
-        points, nodes, tangent, left, normal, path.curvature[run], reach[run], path.tall[run], run.start
-    )
 
 
 def unit(vectors: Array) -> Array:

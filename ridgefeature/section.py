@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,10 +65,10 @@ class Section:
         """Knot spans from foot to foot."""
         return len(self.table) - 2
 
-    @property
+    @cached_property
     def half_height_width(self) -> float:
         """Full width at half height as a part of the width between the feet."""
-        eta = np.linspace(-0.5, 0.5, 20001)
+        eta = np.linspace(-0.5, 0.5, 2001)
         above = eta[self(eta) >= 0.5]
         return float(self._crossing(above[-1]) - self._crossing(above[0]))
 

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.basis import local_basis
-from ridgefeature.kernels.penalised import assembled, changed_band, most_likely
-from ridgefeature.kernels.strip import TERMS
+from ridgefeature.kernels.penalised import assembled, changed_band, local_covariances, most_likely
 
 Floats = NDArray[np.float64]
 
@@ -37,13 +36,7 @@ class Smooth:
 
     def covariances(self, first: NDArray[np.intp], basis: Floats, one: int, other: int) -> Floats:
         """Covariances (k,) of two terms at the same place."""
-        total = np.zeros(len(basis))
-        for k in range(4):
-            for m in range(4):
-                i, j = TERMS * (first + k) + one, TERMS * (first + m) + other
-                high, low = np.maximum(i, j), np.minimum(i, j)
-                total += basis[:, k] * basis[:, m] * self.covariance[high, high - low]
-        return total
+        return local_covariances(self.covariance, first, basis, one, other)
 
     def changed(self, change: Floats) -> Smooth:
         """The same for other terms, `change` (6, 6) times these."""

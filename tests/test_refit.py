@@ -64,6 +64,38 @@ def test_of_many_points_some_are_taken():
     assert 500 < some <= 1000 < whole
 
 
+def test_which_points_are_taken_does_not_depend_on_their_order():
+    ridge, points = spiral_ridge(), np.repeat(spiral_points(12000), 2, axis=0)
+    path = path_frame(ridge, False)
+    shuffled = points[np.random.default_rng(4).permutation(len(points))]
+    one, other = (points_along(build_grid(p), path, path.width, 3000) for p in (points, shuffled))
+    np.testing.assert_array_equal(one, other)
+
+
+def lattice(turn: float) -> np.ndarray:
+    """The spiral's surface at the places (250,000 of them) of a square grid, turned about its axis."""
+    x, y = np.meshgrid(*2 * [0.2 * np.arange(500) - 50.0])
+    c, s = np.cos(turn), np.sin(turn)
+    flat = np.column_stack([x.ravel(), y.ravel()]) @ np.array([[c, s], [-s, c]])
+    return np.column_stack([flat, SPIRAL.elevation(flat)])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_the_points_that_are_taken_lie_more_evenly_than_by_chance(turn):
+    path = path_frame(spiral_ridge(), False)
+    grid, reach = build_grid(lattice(turn)), 0.6 * path.width
+    whole, uneven = points_along(grid, path, reach, 10**6), []
+    for most in (500, 1000, 2000, 5000, 15000):
+        some = points_along(grid, path, reach, most)
+        assert 0.5 * most < len(some) < most
+        for column in range(3):
+            edges = np.quantile(whole[:, column], np.linspace(0, 1, 13)[1:-1])
+            all_, found = (np.bincount(np.searchsorted(edges, p[:, column])) for p in (whole, some))
+            expected = all_ * len(some) / len(whole)
+            uneven.append(float(((found - expected) ** 2 / expected).mean()))
+    assert max(uneven) < 1.4 and np.mean(uneven) < 0.6  # 0.9 by chance
+
+
 def test_a_path_runs_on_as_it_bends():
     path = path_frame(spiral_ridge(), False, (10.0, 10.0))
     radius = np.linalg.norm(path.origin[:, :2], axis=1)

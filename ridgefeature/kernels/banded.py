@@ -59,12 +59,25 @@ def inverse_band(factored: Floats) -> Floats:
     """The lower band of the inverse (n, m + 1), by the factor."""
     n, m = factored.shape[0], factored.shape[1] - 1
     out = np.zeros_like(factored)
+    # The inverse's block of the m rows after that at hand, whole, so that sums run along its rows: row i of
+    # the inverse is row i modulo m there.
+    block, column, new = np.zeros((m, m)), np.zeros(m), np.zeros(m)
     for i in range(n - 1, -1, -1):
-        last = min(i + m, n - 1)
-        for j in range(last, i - 1, -1):
-            total = 1.0 / factored[i, 0] if i == j else 0.0
-            for k in range(i + 1, last + 1):
-                low, high = min(k, j), max(k, j)
-                total -= factored[k, k - i] * out[high, high - low]
-            out[j, j - i] = total / factored[i, 0]
+        pivot = 1.0 / factored[i, 0]
+        for k in range(i + 1, min(i + m, n - 1) + 1):
+            column[k % m] = factored[k, k - i] * pivot
+        variance = pivot * pivot
+        for j in range(m):
+            total = 0.0
+            for k in range(m):
+                total -= block[j, k] * column[k]
+            new[j] = total
+            variance -= total * column[j]
+        out[i, 0] = variance
+        for j in range(i + 1, min(i + m, n - 1) + 1):
+            out[j, j - i] = new[j % m]
+        own = i % m
+        for j in range(m):
+            block[own, j] = block[j, own] = new[j]
+        block[own, own] = variance
     return out

@@ -149,3 +149,15 @@ def changed_band(band: Floats, change: Floats) -> Floats:
                         for r in range(TERMS):
                             out[one, one - other] += half[p, r] * change[q, r]
     return out
+
+
+@njit(**OPTIONS)
+def local_covariances(band: Floats, first: Indices, basis: Floats, one: int, other: int) -> Floats:
+    """Covariances (m,) of two terms where the basis functions from `first` (m,) on are `basis` (m, 4)."""
+    out = np.zeros(first.size)
+    for n in range(first.size):
+        for k in range(4):
+            for m in range(4):
+                i, j = TERMS * (first[n] + k) + one, TERMS * (first[n] + m) + other
+                out[n] += basis[n, k] * basis[n, m] * band[max(i, j), abs(i - j)]
+    return out

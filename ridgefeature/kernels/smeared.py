@@ -146,7 +146,9 @@ def smeared_basis(
 
 
 @njit(**INNER)
-def smeared_at(eta: float, values: Floats, reach: float) -> tuple[float, float, float, float, float, float, float]:
+def smeared_at(
+    eta: float, values: Floats, reach: float
+) -> tuple[float, float, float, float, float, float, float]:
     """Mean height, slope, second derivative, variance by that of the noise, least and largest height, and
     derivative with the apex height; values (cells + 1, 6) as `smeared` has them."""
     cells = values.shape[0] - 1

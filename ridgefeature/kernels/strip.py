@@ -47,16 +47,23 @@ def rectified(
     n = origin.shape[0]
     out = np.empty((points.shape[0], 3))
     m = 0
-    ahead = np.empty(n)
+    ahead, steps = np.empty(n), np.empty(n - 1)
+    # By columns, for SIMD.
+    planes = np.empty((4, n))
+    for j in range(n):
+        planes[0, j], planes[1, j], planes[2, j] = tangent[j, 0], tangent[j, 1], tangent[j, 2]
+        planes[3, j] = _along(0.0, 0.0, 0.0, origin, tangent, j)
+    for j in range(n - 1):
+        steps[j] = _distance(origin, j)
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         for j in range(n):
-            ahead[j] = _along(x, y, z, origin, tangent, j)
+            ahead[j] = planes[3, j] + x * planes[0, j] + y * planes[1, j] + z * planes[2, j]
         best = -1.0
         for j in range(n - 1):
             if not ahead[j] >= 0.0 > ahead[j + 1]:
                 continue
-            step = _distance(origin, j)
+            step = steps[j]
             span = ahead[j] - ahead[j + 1]
             if span < _LEAST_STEP * step:
                 continue
@@ -248,7 +255,9 @@ def information(
         j, there = terms_at(terms, points[i, 0])
         h, w = there[4], there[5]
         m = np.int64(points[i, 0] / stride + 0.5)
-        r, far, f, growth, rate, bow, eta, per_scale = seen_at(y, points[i, 2], there, values[m], reach, scale)
+        r, far, f, growth, rate, bow, eta, per_scale = seen_at(
+            y, points[i, 2], there, values[m], reach, scale
+        )
         weight = share_of_surface(far, per_scale * scale, stray)
         sums[0] += 1.0
         sums[1] += weight

@@ -6,6 +6,9 @@ from numba import njit
 from .algebra import copy_into
 from .grid import LIMIT, Cells, Floats, Ints, before, cell_index
 
+_FEW = 32
+"""Points of a cell up to which all pairs are compared to sort them."""
+
 
 @njit(cache=True)
 def _sort_rows(rows: Floats, first: int, last: int) -> None:
@@ -105,40 +108,147 @@ def _scalars(origin: Floats, axes: Floats, half: Floats) -> tuple[float, ...]:
 
 
 @njit(cache=True)
-def box_points(
-    points: Floats, starts: Cells, levels: Ints, frame: Floats, origin: Floats, axes: Floats, half: Floats
-) -> tuple[Floats, int]:
-    """Box coordinates of the points of a box, in a buffer, and their number: by cell, sorted in each."""
+def _rows(
+    starts: Cells, levels: Ints, frame: Floats, origin: Floats, axes: Floats, half: Floats
+) -> tuple[Ints, int]:
+    """The cells that may meet a box, as runs (rows, 3) of cell numbers, the first and one past the last, with
+    their number of points; and the number of runs, empty ones left out."""
     reach = np.empty(3)
     pad = _box_reach(frame, origin, axes, half, reach)
     first_y, last_y = _span(levels, frame, 1, origin[1] - reach[1], origin[1] + reach[1])
     first_z, last_z = _span(levels, frame, 2, origin[2] - reach[2], origin[2] + reach[2])
-    rows = (last_y - first_y + 1) * (last_z - first_z + 1)
-    spans = np.empty((rows, 2), np.int64)
-    total = 0
+    out = np.empty(((last_y - first_y + 1) * (last_z - first_z + 1), 3), np.int64)
     i = 0
     for z in range(first_z, last_z + 1):
         for y in range(first_y, last_y + 1):
             x0, x1 = _clip_row(levels, frame, origin, axes, half, reach, pad, y, z)
             row = (z * levels[0, 1] + y) * levels[0, 0]
-            spans[i, 0], spans[i, 1] = row + x0, row + x1 + 1
-            total += starts[row + x1 + 1] - starts[row + x0] if x1 >= x0 else 0
-            i += 1
+            held = starts[row + x1 + 1] - starts[row + x0] if x1 >= x0 else 0
+            out[i, 0], out[i, 1], out[i, 2] = row + x0, row + x1 + 1, held
+            i += held > 0
+    return out, i
+
+
+@njit(cache=True)
+def box_points(
+    points: Floats,
+    starts: Cells,
+    levels: Ints,
+    frame: Floats,
+    origin: Floats,
+    axes: Floats,
+    half: Floats,
+    every: int,
+) -> tuple[Floats, int]:
+    """Box coordinates of the points of a box, in a buffer, and their number: by cell, sorted in each.
+
+    every: about one of so many is taken, spread evenly; of the others whole cells are not even looked at.
+    """
+    rows, n = _rows(starts, levels, frame, origin, axes, half)
+    total, largest = 0, 0
+    for i in range(n):
+        total += rows[i, 2]
+        for c in range(rows[i, 0], rows[i, 1]):
+            largest = max(largest, starts[c + 1] - starts[c])
     ox, oy, oz, hx, hy, hz, xx, xy, xz, yx, yy, yz, zx, zy, zz = _scalars(origin, axes, half)
     out = np.empty((total, 3))
+    cell, order = np.empty((3, largest)), np.empty(largest, np.int64)
     m = 0
-    for i in range(rows):
-        for c in range(spans[i, 0], spans[i, 1]):
-            run = m
-            for j in range(starts[c], starts[c + 1]):
+    for i in range(n):
+        block, chosen = np.int64(-1), np.int64(-1)
+        for c in range(rows[i, 0], rows[i, 1]):
+            first, last = np.int64(starts[c]), np.int64(starts[c + 1])
+            if first == last:
+                continue
+            if every > 1:
+                if block < 0:
+                    block = first // every - 1
+                while chosen < first:
+                    block += 1
+                    chosen = _chosen(block, every)
+                if chosen >= last:
+                    continue
+            k = 0
+            for j in range(first, last):
                 dx, dy, dz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
                 px = dx * xx + dy * xy + dz * xz
                 py = dx * yx + dy * yy + dz * yz
                 pz = dx * zx + dy * zy + dz * zz
-                out[m, 0], out[m, 1], out[m, 2] = px, py, pz
-                m += abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz
-            _sort_rows(out, run, m)
+                cell[0, k], cell[1, k], cell[2, k] = px, py, pz
+                k += abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz
+            _ordered(cell, k, order)
+            if every == 1:
+                for j in range(k):
+                    out[m, 0], out[m, 1], out[m, 2] = cell[0, order[j]], cell[1, order[j]], cell[2, order[j]]
+                    m += 1
+                continue
+            while chosen < first + k:
+                j = order[chosen - first]
+                out[m, 0], out[m, 1], out[m, 2] = cell[0, j], cell[1, j], cell[2, j]
+                m += 1
+                block += 1
+                chosen = _chosen(block, every)
     return out, m
+
+
+@njit(cache=True)
+def _chosen(block: int, every: int) -> int:
+    """The row that is chosen of a block of so many; its place in the block goes by the golden ratio.
+
+    Multiples of that are spread evenly, and points of a regular scan are not chosen in stripes.
+    """
+    return block * every + (((block * 2654435769) & 0xFFFFFFFF) * every >> 32)
+
+
+@njit(cache=True)
+def _ordered(cell: Floats, k: int, order: Ints) -> None:
+    """Order the first k columns of cell (3, n) by x, then y, then z: their numbers, into order."""
+    if k > _FEW:
+        rows = np.empty((k, 3))
+        for i in range(k):
+            rows[i, 0], rows[i, 1], rows[i, 2] = cell[0, i], cell[1, i], cell[2, i]
+        _sort_rows(rows, 0, k)
+        for i in range(k):
+            cell[0, i], cell[1, i], cell[2, i] = rows[i, 0], rows[i, 1], rows[i, 2]
+            order[i] = i
+        return
+    # Free of branches that cannot be foretold: faster than any sort, of so few.
+    for i in range(k):
+        x, place, same = cell[0, i], 0, 0
+        for j in range(k):
+            place += cell[0, j] < x
+            same += cell[0, j] == x
+        if same > 1:
+            for j in range(k):
+                if cell[0, j] == x and j != i:
+                    alike = cell[1, j] == cell[1, i]
+                    less = cell[1, j] < cell[1, i] or (alike and cell[2, j] < cell[2, i])
+                    place += less or (alike and cell[2, j] == cell[2, i] and j < i)
+        order[place] = i
+
+
+@njit(cache=True)
+def box_count(starts: Cells, levels: Ints, frame: Floats, origin: Floats, axes: Floats, half: Floats) -> int:
+    """About how many points a box holds: those of the cells whose middles it holds, or may hold in height."""
+    rows, n = _rows(starts, levels, frame, origin, axes, half)
+    high = half[2]
+    for a in range(3):
+        high += 0.5 * abs(axes[2, a]) * frame[3 + a]
+    total = 0
+    for i in range(n):
+        for c in range(rows[i, 0], rows[i, 1]):
+            if starts[c] == starts[c + 1]:
+                continue
+            row = c // levels[0, 0]
+            dx = frame[0] + (c - row * levels[0, 0] + 0.5) * frame[3] - origin[0]
+            dy = frame[1] + (row % levels[0, 1] + 0.5) * frame[4] - origin[1]
+            dz = frame[2] + (row // levels[0, 1] + 0.5) * frame[5] - origin[2]
+            px = dx * axes[0, 0] + dy * axes[0, 1] + dz * axes[0, 2]
+            py = dx * axes[1, 0] + dy * axes[1, 1] + dz * axes[1, 2]
+            pz = dx * axes[2, 0] + dy * axes[2, 1] + dz * axes[2, 2]
+            if abs(px) <= half[0] and abs(py) <= half[1] and abs(pz) <= high:
+                total += starts[c + 1] - starts[c]
+    return total
 
 
 @njit(cache=True)
