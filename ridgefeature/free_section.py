@@ -73,7 +73,8 @@ def free_section(
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
     points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section before, smeared;
-    noise: scale and strays' density; price: of a coefficient, in twice the log likelihood ratio. It spans `wider` widths: where its feet are `trimmed` tells once it is final.
+    noise: scale and strays' density; price: of a coefficient, in twice the log likelihood ratio. It spans
+    `wider` widths: where its feet are `trimmed` tells once it is final.
     """
     matrix, right = _sums(points, terms, seen, noise, spans, wider)
     told = np.diagonal(matrix)
@@ -186,7 +187,7 @@ def _humped(
     inner = found[3:spans]
     # Given the inner ones the others follow.
     precision = np.linalg.inv(inverse[3:spans, 3:spans])
-    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
+    root = np.asarray(np.linalg.cholesky(0.5 * (precision + precision.T)).T, dtype=np.float64)
     one, cost = one_hump(inner, root)
     even, shift, even_cost = symmetric_hump(inner, root)
     part = 1.0

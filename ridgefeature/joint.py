@@ -105,23 +105,20 @@ def fit_whole(
         return None
     some = points[:: 1 + len(points) // SOME_POINTS]
     shaping = settings.section in ("auto", "learned")
-    state: _State | None = _begun(some, path, section, before)
-    if before is None and shaping:
-        state = _likeliest(some, path, state, flat)
+    begun = _begun(some, path, section, before)
+    state = _likeliest(some, path, begun, flat) if before is None and shaping else begun
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
         state = _improved(points if last else some, some, path, state, flat, left)
-        if state is None:
-            return None
-        if last:
+        if last or state is None:
             break
         if shaping:
             new = state.given(*shaped(some, state.terms, state.section, state.noise, state.inflation))
             shaping, state = new.section is not state.section, new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
-    return _joint(points, some, path, state)
+    return None if state is None else _joint(points, some, path, state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +156,8 @@ def _sizes(path: PathFrame) -> tuple[float, float]:
 
 
 def _likeliest(points: Array, path: PathFrame, state: _State, flat: bool) -> _State | None:
-    """After some rounds, the likeliest of steep ridges: with the section that it has or with a box, and points
-    evenly over the base or over the surface."""
+    """The likeliest of what a steep ridge may be, after some rounds: with the section that it has or with a
+    box, and with points that lie evenly over the base or over the surface."""
     h, w = _sizes(path)
     if h < _STEEP * w:
         return state

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
@@ -27,10 +26,10 @@ def one_hump(free: Array, root: Array) -> tuple[Array, float]:
         # Sums from the left up to the top, and from the right beyond it, of steps that are all upwards.
         same_side = (at[:, None] <= top) == (at <= top)
         sums = np.where(at[:, None] <= top, up, up.T) * same_side
-        steps, miss = nnls(root @ sums, root @ free)
-        if miss < best:
-            best, kept = float(miss), sums @ steps
-    return kept, best**2
+        steps, loss = not_negative(root @ sums, root @ free)
+        if loss < best:
+            best, kept = loss, sums @ steps
+    return kept, best
 
 
 def symmetric_hump(free: Array, root: Array) -> tuple[Array, float, float]:
@@ -43,5 +42,35 @@ def symmetric_hump(free: Array, root: Array) -> tuple[Array, float, float]:
     sums = np.minimum(half, half[::-1])
     padded = np.concatenate([[0.0], 0.5 * (free + free[::-1]), [0.0]])
     moved = 0.5 * (padded[:-2] - padded[2:])[:, None]
-    steps, miss = nnls(root @ np.hstack([sums, moved, -moved]), root @ free)
-    return sums @ steps[:-2], float(steps[-2] - steps[-1]), float(miss) ** 2
+    steps, loss = not_negative(root @ np.hstack([sums, moved, -moved]), root @ free)
+    return sums @ steps[:-2], float(steps[-2] - steps[-1]), loss
+
+
+def not_negative(columns: Array, goal: Array) -> tuple[Array, float]:
+    """Non-negative factors (n,) of columns (m, n) whose sum is nearest to a goal (m,), and its loss.
+
+    The active set method of Lawson and Hanson (1974) in normal equations (Bro and de Jong 1997). That of
+    scipy.optimize takes longer to import than a ridge to register.
+    """
+    gram, pull = columns.T @ columns, columns.T @ goal
+    x, free = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
+    limit = 1e-10 * float(np.abs(pull).max(initial=0.0))
+    for _ in range(3 * len(pull)):
+        gain = np.where(free, -np.inf, pull - gram @ x)
+        if free.all() or gain.max() <= limit:
+            break
+        free[np.argmax(gain)] = True
+        while True:
+            wanted = np.zeros(len(pull))
+            wanted[free] = np.linalg.lstsq(gram[np.ix_(free, free)], pull[free], rcond=None)[0]
+            if not free.any() or wanted[free].min() > 0:
+                break
+            # As far as the first that would become negative, which is fixed at 0.
+            low = np.flatnonzero(free & (wanted <= 0))
+            part = x[low] / np.maximum(x[low] - wanted[low], 1e-300)
+            x += part.min() * (wanted - x)
+            free[low[part == part.min()]] = False
+            x[~free] = 0.0
+        x = wanted
+    miss = goal - columns @ x
+    return x, float(miss @ miss)

@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 def shaped(
     points: Array, terms: Array, section: Section, noise: Noise, inflation: float
 ) -> tuple[Section, Array]:
-    """The section and terms (n, 6), or a free section and its terms where that is better beyond doubt; a box is never kept.
+    """The section and terms (n, 6), or a free section and its terms where that is better beyond doubt.
 
-    points (m, 3) in path coordinates and terms as in kernels.strip; inflation: variance of sums over
-    neighbouring points, by what it would be if their noise was independent.
+    A box is never kept. points (m, 3) in path coordinates and terms as in kernels.strip; inflation: variance
+    of sums over neighbouring points, by what it would be if their noise was independent.
     """
     price = np.log(len(points))
     seen = smear(section, terms, noise.blur, noise.even)

@@ -31,9 +31,8 @@ _FINE = 0.015
 class Smeared:
     """A section smeared over the noise, once a width along the ridge.
 
-    values (m, cells + 1, 6) as kernels.smeared has them, between -reach and reach; blur, steepness (m,): noise
-    in widths, apex heights in widths there; even: 0 where points lie evenly over the base, 1 where over the
-    surface.
+    values (m, cells + 1, 6) as kernels.smeared has them, from -reach to reach; blur, steepness (m,): noise
+    and apex height in widths there; even: 0 where points lie evenly over the base, 1 over the surface.
     """
 
     section: Section
@@ -49,7 +48,10 @@ class Smeared:
         return self.values, self.reach, NODES_A_WIDTH
 
     def basis(self, spans: int, wider: float) -> Array:
-        """Smeared splines (m, cells, spans + 3) of so many spans over `wider` widths, at the cells' middles."""
+        """How what is seen at the cells' middles changes with the coefficients of a spline section.
+
+        (m, cells, spans + 3), of so many spans over `wider` widths.
+        """
         cells = self.values.shape[1] - 1
         middles = ((np.arange(cells) + 0.5) / cells * 2.0 - 1.0) * self.reach
         rule = _rule(float(self.blur.max()))

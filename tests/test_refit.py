@@ -9,7 +9,7 @@ import pytest
 from oracles import SPIRAL, apex, spiral_points, spiral_ridge
 
 import ridgefeature as rf
-from ridgefeature.free_section import SectionStd, trimmed
+from ridgefeature.free_section import trimmed
 from ridgefeature.grid import build_grid
 from ridgefeature.joint_stations import refitted
 from ridgefeature.kernels.strip import rectified
@@ -165,11 +165,6 @@ def test_a_section_within_a_wider_one_is_trimmed_to_its_feet(make):
     assert breadth == pytest.approx(1 / wider, rel=0.08)  # where a foot begins is hardly seen
     half = found.half_height_width * breadth
     assert half == pytest.approx(make().half_height_width / wider, rel=0.01)
-
-
-def test_deviations_in_other_widths():
-    std = SectionStd(0.1, 0.2, 0.3, 0.4)
-    assert std.in_parts_of(2.0) == SectionStd(0.1, 0.1, 0.15, 0.2)
 
 
 # Ends

@@ -19,9 +19,9 @@ def cell_sums(
 ) -> tuple[Floats, Floats, Floats]:
     """Sums of what the points in each cell of the smeared section say, in units of the noise.
 
-    points, terms, seen and noise as in kernels.strip. With height x in local apex heights at a cell, and the
-    base's changes of offset, tilt and curvature (b, in powers of y): of each cell (m, cells, 5) the factors of
-    x^2, of x, and of x b in the normal equations, and the base's own (3, 3) and (3,).
+    points, terms, seen and noise as in kernels.strip. With height x in local apex heights at a cell, and
+    changes b of the base in powers of y: of each cell (m, cells, 5) the factors of x^2, of x, and of x b in
+    the normal equations, and the base's own (3, 3) and (3,).
     """
     values, reach, stride = seen
     cells = values.shape[1] - 1

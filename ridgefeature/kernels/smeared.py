@@ -18,8 +18,8 @@ from ridgefeature.kernels.residual import INNER, OPTIONS, split
 Floats = NDArray[np.float64]
 Columns = tuple[Floats, Floats, Floats, Floats]
 VALUE, RATE, SPREAD, LOW, HIGH, GROWTH = range(6)
-_NEAR = 2.5
-"""Deviations of the noise within which heights are those of the surface there."""
+_RARE = 3.0
+"""Deviations of the noise beyond which a point on an even slope is as rare as one so far over its top."""
 
 
 @njit(**INNER)
@@ -60,12 +60,13 @@ def smeared(
     reach: float,
     cells: int,
 ) -> Floats:
-    """What is seen of a section (m, cells + 1, 6), for m amounts of noise.
+    """What is seen of a section (m, cells + 1, 6), for m amounts of noise, at even places up to reach.
 
-    Mean height, its slope, variance by that of the noise, the least and largest height within 2.5
-    deviations, and the derivative of the mean with the apex height, by which steep places are crowded; at cells + 1 even places from -reach to reach. table: as in Section; blur (m,): standard deviations
-    of the noise; steepness (m,): apex heights in widths; even: as in `_crowded`; abscissae, shares (k,): of a
-    quadrature over the standard normal distribution.
+    The mean height, its slope, its variance by that of the noise, the least and the largest height as far
+    aside as noise may well carry points, and the derivative of the mean with the apex height, by which steep
+    places are crowded too. table: as in Section; blur (m,): standard deviations of the noise; steepness (m,):
+    apex heights in widths; even: as in `_crowded`; abscissae, shares (k,): of a quadrature over the standard
+    normal distribution.
     """
     own = split(table)
     out = np.zeros((blur.size, cells + 1, 6))
@@ -74,7 +75,7 @@ def smeared(
         for i in range(cells + 1):
             eta = (2.0 * i / cells - 1.0) * reach
             level = _section_at(eta, own)[0]
-            d = d1 = n = n1 = v = g = g1 = low = high = 0.0
+            d = d1 = n = n1 = v = g = g1 = 0.0
             for k in range(abscissae.size):
                 f, slope, bow = _section_at(eta + blur[m] * abscissae[k], own)
                 dense, steeper = _crowded(slope, steepness[m], even)
@@ -88,14 +89,19 @@ def smeared(
                 v += dense * f * f
                 g += steeper * slope
                 g1 += steeper * slope * f
-                if abs(abscissae[k]) < _NEAR:
-                    low, high = min(low, f), max(high, f)
             mean = n / d
             out[m, i, VALUE] = level + mean
             out[m, i, RATE] = (n1 - mean * d1) / d
             out[m, i, SPREAD] = max(v / d - mean * mean, 0.0) * square
             out[m, i, GROWTH] = level + mean + (g1 - mean * g) / d
-            out[m, i, LOW], out[m, i, HIGH] = level + low, level + high
+            steep = steepness[m] * math.sqrt(out[m, i, SPREAD])
+            near = _RARE * (math.sqrt(1.0 + steep * steep) - 1.0) / max(steep, 1e-6)
+            low = high = level
+            for k in range(abscissae.size):
+                if abs(abscissae[k]) <= near:
+                    f = _section_at(eta + blur[m] * abscissae[k], own)[0]
+                    low, high = min(low, f), max(high, f)
+            out[m, i, LOW], out[m, i, HIGH] = low, high
     return out
 
 
@@ -189,7 +195,7 @@ def log_likelihood(
     strays: float,
     span: float,
 ) -> float:
-    """Of points' heights where they are seen: of a section whose points are noisy, and even strays over `span`.
+    """Of points' heights where they are seen: of a section with noisy points, and even strays over `span`.
 
     points (n, 2): y from the middle between the feet, and z from the base there; sizes (n, 2): height and
     width there; the rest as for `smeared`, but the noise in the unit of the points.

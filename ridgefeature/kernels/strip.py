@@ -165,11 +165,11 @@ def terms_at(terms: Floats, s: float) -> tuple[int, Terms]:
 def seen_at(
     y: float, z: float, terms: Terms, values: Floats, reach: float, scale: float
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """A point against where points seen at y are expected.
+    """A point against where points seen at its y are expected.
 
-    Its distance from the mean height over the deviation of heights there, and from the nearest height that the
-    surface has near by over the noise, if that is less; the mean height, its derivative with the apex height,
-    its slope and second derivative by place in widths, that place, and 1 over the deviation of heights.
+    Its distance from their mean height, by the deviation of heights there; that from the nearest height that
+    the surface has near by, by the noise, if it is less; the mean height, its derivative with the apex
+    height, its slope and second derivative by place in widths, that place, and 1 over the deviation.
     """
     a, b, c, e, h, w = terms
     eta = (y - e) / w
@@ -255,9 +255,8 @@ def information(
         j, there = terms_at(terms, points[i, 0])
         h, w = there[4], there[5]
         m = np.int64(points[i, 0] / stride + 0.5)
-        r, far, f, growth, rate, bow, eta, per_scale = seen_at(
-            y, points[i, 2], there, values[m], reach, scale
-        )
+        found = seen_at(y, points[i, 2], there, values[m], reach, scale)
+        r, far, f, growth, rate, bow, eta, per_scale = found
         weight = share_of_surface(far, per_scale * scale, stray)
         sums[0] += 1.0
         sums[1] += weight
