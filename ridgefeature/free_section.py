@@ -23,9 +23,13 @@ SPANS = 28
 WIDER = 1.25
 FREE = "free"
 LEARNED = "learned"
-_LOW, _FOOT_ROOT = (0.05, 0.2), 1 / 2.5
+_LOW = (0.04, 0.1, 0.25)
+"""Heights whose places tell where the feet are."""
+_ROOTS = np.array(_LOW) ** (1.0 / np.linspace(2.0, 3.0, 21)[:, None])
 _FOOT_STD = 0.04
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
+_FOOT_BLUR = 2.0
+"""Of the same, in deviations of the noise that smears it."""
 _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
@@ -147,7 +151,8 @@ def section_std(
 
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     half = std(high - low)
-    return SectionStd(std(top), half, math.hypot(half, _FOOT_STD), std(0.5 * (left + right)))
+    foot = math.hypot(_FOOT_STD, _FOOT_BLUR * float(np.median(seen.blur)))
+    return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
 
 def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, Array]:
@@ -230,16 +235,21 @@ def _loss(matrix: Array, right: Array, x: Array) -> float:
 def _feet(section: Section) -> tuple[float, float]:
     """Between which places a section stands out, about its apex.
 
-    Where it rises to two low heights tells where it begins: a foot is between a parabola, as of a cosine,
-    and a cubic, as of a B-spline.
+    Places of three low heights tell which power of the distance from the foot it rises with, from a parabola
+    as of a cosine to a cubic as of a B-spline, and so where it begins.
     """
     eta = np.linspace(-0.5, 0.5, 2001)
     f = section(eta)
     top = int(np.argmax(f))
-    ends = []
-    for heights in (f[top:], f[top::-1]):
-        sides = [int(np.argmax(heights < level * f[top])) or len(heights) - 1 for level in _LOW]
-        outer, inner = (x**_FOOT_ROOT for x in _LOW)
-        reach = sides[0] + (sides[0] - sides[1]) * outer / (inner - outer)
-        ends.append(reach * float(eta[1] - eta[0]))
-    return max(float(eta[top]) - ends[1], -0.5), min(float(eta[top]) + ends[0], 0.5)
+    sides = np.array(
+        [
+            [int(np.argmax(heights < level * f[top])) or len(heights) - 1 for level in _LOW]
+            for heights in (f[top:], f[top::-1])
+        ]
+    )
+    # Between the outer two heights by that between the inner two.
+    found = (sides[:, 1] - sides[:, 2]).sum() / max((sides[:, 0] - sides[:, 1]).sum(), 1)
+    ratios = (_ROOTS[:, 2] - _ROOTS[:, 1]) / (_ROOTS[:, 1] - _ROOTS[:, 0])
+    outer, _, inner = _ROOTS[np.argmin(np.abs(ratios - found))]
+    reach = (sides[:, 0] + (sides[:, 0] - sides[:, 2]) * outer / (inner - outer)) * (eta[1] - eta[0])
+    return max(float(eta[top] - reach[1]), -0.5), min(float(eta[top] + reach[0]), 0.5)
