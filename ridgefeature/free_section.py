@@ -193,13 +193,12 @@ def _humped(
     # Given the inner ones the others follow.
     precision = np.linalg.inv(inverse[3:spans, 3:spans])
     root = np.asarray(np.linalg.cholesky(0.5 * (precision + precision.T)).T, dtype=np.float64)
-    one, cost = one_hump(inner, root)
-    even, shift, even_cost = symmetric_hump(inner, root)
-    part = 1.0
-    if even_cost - cost < price and even_cost < most:
-        one, cost, part = even, even_cost, 0.5
-    else:
-        shift = 0.0
+    one, shift, cost = symmetric_hump(inner, root)
+    part = 0.5
+    if cost > price:
+        free, least = one_hump(inner, root)
+        if cost - least > price or cost > most:
+            one, shift, cost, part = free, 0.0, least, 1.0
     if cost > most or not one.max() > 0:
         return found, 0.0, 1.0
     out = found.copy()

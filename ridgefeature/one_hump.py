@@ -53,24 +53,31 @@ def not_negative(columns: Array, goal: Array) -> tuple[Array, float]:
     scipy.optimize takes longer to import than a ridge to register.
     """
     gram, pull = columns.T @ columns, columns.T @ goal
-    x, free = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
+    gram[np.diag_indices(len(pull))] *= 1.0 + 1e-12
+    x, free = np.zeros(len(pull)), np.linalg.lstsq(gram, pull, rcond=None)[0] > 0
     limit = 1e-10 * float(np.abs(pull).max(initial=0.0))
     for _ in range(3 * len(pull)):
+        x = _of_free(gram, pull, x, free)
         gain = np.where(free, -np.inf, pull - gram @ x)
         if free.all() or gain.max() <= limit:
             break
         free[np.argmax(gain)] = True
-        while True:
-            wanted = np.zeros(len(pull))
-            wanted[free] = np.linalg.lstsq(gram[np.ix_(free, free)], pull[free], rcond=None)[0]
-            if not free.any() or wanted[free].min() > 0:
-                break
-            # As far as the first that would become negative, which is fixed at 0.
-            low = np.flatnonzero(free & (wanted <= 0))
-            part = x[low] / np.maximum(x[low] - wanted[low], 1e-300)
-            x += part.min() * (wanted - x)
-            free[low[part == part.min()]] = False
-            x[~free] = 0.0
-        x = wanted
     miss = goal - columns @ x
     return x, float(miss @ miss)
+
+
+def _of_free(gram: Array, pull: Array, x: Array, free: NDArray[np.bool_]) -> Array:
+    """The best factors of those that are free, from allowed ones x; those that come to 0 are free no more."""
+    while free.any():
+        at = np.flatnonzero(free)
+        wanted = np.zeros(len(pull))
+        wanted[at] = np.linalg.solve(gram[at[:, None], at], pull[at])
+        if wanted[at].min() > 0:
+            return wanted
+        # As far as the first that would become negative.
+        low = at[wanted[at] <= 0]
+        part = x[low] / np.maximum(x[low] - wanted[low], 1e-300)
+        x = x + part.min() * (wanted - x)
+        free[low[part <= part.min()]] = False
+        x[~free] = 0.0
+    return np.zeros(len(pull))
