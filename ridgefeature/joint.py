@@ -105,12 +105,13 @@ def fit_whole(
         return None
     some = points[:: 1 + len(points) // SOME_POINTS]
     shaping = settings.section in ("auto", "learned")
-    begun = _begun(some, path, section, before)
-    state = _likeliest(some, path, begun, flat) if before is None and shaping else begun
+    task = _task(some, path, flat)
+    begun = _begun(task, section, before)
+    state = _likeliest(task, begun) if before is None and shaping else begun
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = _improved(points if last else some, some, path, state, flat, left)
+        state = _improved(task, points if last else some, state, left)
         if last or state is None:
             break
         if shaping:
@@ -138,30 +139,42 @@ class _State:
         return replace(self, section=section, terms=terms)
 
 
-def _begun(points: Array, path: PathFrame, section: Section, before: Joint | None) -> _State:
-    h, w = _sizes(path)
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What stays the same through all rounds: some of the points, the path, what its smoothness asks for."""
+
+    some: Array
+    path: PathFrame
+    flat: bool
+    wanted: Array
+    height: float
+    width: float
+
+
+def _task(some: Array, path: PathFrame, flat: bool) -> _Task:
+    known = np.abs(path.height[path.height != 0])
+    width = float(np.median(path.width))
+    return _Task(some, path, flat, _wanted(path), float(np.median(known)) if len(known) else width, width)
+
+
+def _begun(task: _Task, section: Section, before: Joint | None) -> _State:
+    path, h, w = task.path, task.height, task.width
     terms = np.zeros((len(path.at), TERMS))
     terms[:, H], terms[:, W] = path.height, path.width
     if before is None:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
-        return _State(terms, section, first_noise(points, terms, section, h, w), weights)
+        return _State(terms, section, first_noise(task.some, terms, section, h, w), weights)
     return _State(terms, section, before.noise, before.smooth.weights)
 
 
-def _sizes(path: PathFrame) -> tuple[float, float]:
-    """Usual height, where the ridge is known, and width."""
-    known = np.abs(path.height[path.height != 0])
-    width = float(np.median(path.width))
-    return float(np.median(known)) if len(known) else width, width
-
-
-def _likeliest(points: Array, path: PathFrame, state: _State, flat: bool) -> _State | None:
+def _likeliest(task: _Task, state: _State) -> _State | None:
     """The likeliest of what a steep ridge may be, after some rounds: with the section that it has or with a
     box, and with points that lie evenly over the base or over the surface."""
-    h, w = _sizes(path)
+    h, w = task.height, task.width
     if h < _STEEP * w:
         return state
-    points = points[:: 1 + len(points) // _TELLING]
+    points = task.some[:: 1 + len(task.some) // _TELLING]
+    task = replace(task, some=points)
     best, kept = -np.inf, None
     for section in (state.section, box()):
         terms = with_half_height_width(state.terms, state.section, section)
@@ -169,7 +182,7 @@ def _likeliest(points: Array, path: PathFrame, state: _State, flat: bool) -> _St
             noise = first_noise(points, terms, section, h, w, even)
             found: _State | None = _State(terms, section, noise, state.weights)
             for n in range(_TRIAL_ROUNDS):
-                found = _improved(points, points, path, found, flat, _TRIAL_ROUNDS - n)
+                found = _improved(task, points, found, _TRIAL_ROUNDS - n)
             if found is not None and (chance := _chance(points, found)) > best:
                 best, kept = chance, found
     return kept
@@ -182,26 +195,24 @@ def _chance(points: Array, state: _State) -> float:
     return log_likelihood(points, state.terms, state.section, *told)
 
 
-def _improved(
-    points: Array, some: Array, path: PathFrame, state: _State | None, flat: bool, left: int
-) -> _State | None:
-    """All terms fitted again; None where nothing finite came of it.
+def _improved(task: _Task, points: Array, state: _State | None, left: int) -> _State | None:
+    """All terms fitted again to points; None where nothing finite came of it.
 
-    some: those of the points that tell the noise. left: rounds still to come: until then what the terms miss
-    is no stray yet.
+    left: rounds still to come: until then what the terms miss is no stray yet.
     """
     if state is None:
         return None
-    matrix, goal, noise, gain = _linearised(points, some, state, EXACT * 2.0**left * _sizes(path)[0])
+    path = task.path
+    matrix, goal, noise, gain = _linearised(points, task.some, state, EXACT * 2.0**left * task.height)
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = inflation_of(gain * matrix, gain * goal) if state.smooth is not None else state.inflation
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
     matrix, goal = gain / inflation * matrix, gain / inflation * goal
-    if flat:
+    if task.flat:
         _fix(matrix, goal, C)
     middle = 0.5 * (path.knots[1:] + path.knots[:-1])
-    smooth = smoothest(matrix, goal, middle, path.coefficients, _wanted(path), state.weights)
+    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, state.weights)
     first, basis = basis_at(path.coefficients, path.knots)
     terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
     if not np.isfinite(terms).all():

@@ -70,7 +70,8 @@ def first_noise(
 
 def blur_of(points: Array, terms: Array, distances: Array, scale: float, span: float, least: float) -> float:
     """The noise as points beyond the feet tell it, but no more than all of them do."""
-    nodes = np.arange(len(terms))
+    every, nodes = 1 + len(points) // _ENOUGH, np.arange(len(terms))
+    points, distances = points[::every], distances[::every]
     aside = np.abs(points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E]))
     beyond = distances[aside > 0.5 * np.interp(points[:, 0], nodes, terms[:, W])]
     if len(beyond) < _FEWEST:
