@@ -29,6 +29,8 @@ _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
 _DISTINCT = 0.1
 """What one template must have of the evidence that tells a whole ridge from other surfaces."""
+_AIM = 0.25
+"""Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
 _OFFSETS = np.array([-0.3, 0.0, 0.3])
 
@@ -153,11 +155,15 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
 
 
 def _score(window: Window, template: Template, pick: Array) -> float:
-    """How well a template explains its window, counting 300 points at most; 0 if it misses the pick."""
+    """How well a template explains its window, counting 300 points at most; 0 if it misses the pick.
+
+    Less if it lies beside the pick: where ridges lie side by side the one that was aimed at is meant.
+    """
     if template.status in ("failed", "no data") or template.height == 0:
         return 0.0
     local = template.rotation.T @ (pick - template.position)
     if abs(local[1]) > 0.55 * template.width:
         return 0.0
     points = window(template)
-    return min(len(points), 300) * float(explained(points, *template.shape))
+    near = math.exp(-0.5 * (local[1] / (_AIM * template.width)) ** 2)
+    return near * min(len(points), 300) * float(explained(points, *template.shape))
