@@ -34,7 +34,12 @@ _POOR_START = 0.5
 _HOPELESS = 3.0
 """Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
-"""A fit whose noise is this many times that of the last three templates is suspect."""
+"""A fit whose noise is this many times that usual of the last three templates is suspect."""
+_MISFIT, _LEAST_MISFIT = 2.0, 0.1
+"""A fit whose noise is this many times the least of the last five, and this part of its height, has met
+something else."""
+_STEPS_ACROSS = (0.5, 1.0)
+"""How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
 _CORNER_RADIUS = 0.5
 _CORNER_EVIDENCE = 0.3
@@ -150,6 +155,8 @@ def _fit_next(
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    if not found[2] and not gap and _misfits(found[1], chain):
+        return _across(rough, chain, settings) or _round_corner(rough, chain, settings) or found
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
         return _round_corner(rough, chain, settings) or found
     if not found[2].startswith(FLAT):
@@ -159,6 +166,37 @@ def _fit_next(
         if not longer[2]:
             return longer
     return found
+
+
+def _misfits(fitted: Template, chain: list[Template]) -> bool:
+    """Whether a template fits much worse than the last ones: where ridges meet, or it is none any more."""
+    usual = min(t.scale for t in chain[-_USUAL:])
+    return fitted.scale > max(_MISFIT * usual, _LEAST_MISFIT * abs(fitted.height))
+
+
+def _across(
+    rough: Window, chain: list[Template], settings: Settings
+) -> tuple[Template, Template, str] | None:
+    """The next template straight on beyond a place where other ridges join this one, if it fits as usual."""
+    last, straight = chain[-1], append(chain[-1:], settings)[0]
+    for step in _STEPS_ACROSS:
+        start = straight.changed(
+            position=straight.position + step * settings.look_ahead * last.width * last.rotation[:, 0]
+        )
+        fitted = improve(rough, start, settings)
+        if (
+            _alike(fitted, last)
+            and not _reject(fitted, start, settings, gap=True)
+            and not _misfits(fitted, chain)
+            and _met(fitted, chain[:-1]) < 0
+        ):
+            return start, fitted, ""
+    return None
+
+
+def _alike(fitted: Template, last: Template) -> bool:
+    """Whether width and height are those of the last template, as behind a corner or a crossing."""
+    return 0.75 < fitted.width / last.width < 1.33 and 0.6 < fitted.height / last.height < 1.6
 
 
 def corners(chain: list[Template], settings: Settings) -> list[Template]:
@@ -187,11 +225,12 @@ def _round_corner(
     starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, last.scale))
     for start in starts[:2]:
         fitted = improve(rough, start, settings)
-        clear = fitted.evidence > max(_CORNER_EVIDENCE * last.evidence, settings.evidence)
-        alike = 0.75 < fitted.width / last.width < 1.33 and 0.6 < fitted.height / last.height < 1.6
+        # By point: the last one may have been fitted to all points of its window, this one to some.
+        usual = last.evidence / max(last.points, 1) * fitted.points
+        clear = fitted.evidence > max(_CORNER_EVIDENCE * usual, settings.evidence)
         if (
             clear
-            and alike
+            and _alike(fitted, last)
             and not _reject(fitted, start, settings, gap=True)
             and _met(fitted, chain[:-1]) < 0
         ):
@@ -212,7 +251,7 @@ def _fit_best(
 ) -> tuple[Template, Template, str]:
     """The start whose fit is best, this fit, and why it is none."""
     starts, alike = _unlike(starts)
-    suspect = _WORSE * max(t.scale for t in chain[-3:])
+    suspect = _WORSE * statistics.median(t.scale for t in chain[-3:])
     if len(starts) > 1 and start_loss(rough, starts[0], chain[-1].scale) > _POOR_START:
         starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
     best: tuple[Template, Template, str] | None = None
