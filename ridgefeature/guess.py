@@ -29,6 +29,8 @@ _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
 _DISTINCT = 0.1
 """What one template must have of the evidence that tells a whole ridge from other surfaces."""
+_SEEN_ON_BASE = 0.5
+"""Points that a fit on a curved base must see, in those on a flat one: it fits few of them easily."""
 _AIM = 0.25
 """Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
@@ -150,6 +152,8 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
     flat = improve(window, start, settings)
     curved = improve_on_base(window, start, settings)
     if curved is None or not less_noisy(curved, flat) or _score(window, curved, pick) <= 0:
+        return flat
+    if curved.points < _SEEN_ON_BASE * flat.points:
         return flat
     return curved
 

@@ -41,6 +41,7 @@ something else."""
 _STEPS_ACROSS = (0.5, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
+_CORNERS_TRIED = 3
 _CORNER_RADIUS = 0.5
 _CORNER_EVIDENCE = 0.3
 """Evidence of a template behind a sharp bend, in parts of that of the one before."""
@@ -223,8 +224,8 @@ def _round_corner(
     """The next template behind a sharp bend, where the ridge goes on there beyond doubt."""
     last = chain[-1]
     starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, last.scale))
-    for start in starts[:2]:
-        fitted = improve(rough, start, settings)
+    found = [(start, improve(rough, start, settings)) for start in starts[:_CORNERS_TRIED]]
+    for start, fitted in sorted(found, key=lambda pair: pair[1].scale):
         # By point: the last one may have been fitted to all points of its window, this one to some.
         usual = last.evidence / max(last.points, 1) * fitted.points
         clear = fitted.evidence > max(_CORNER_EVIDENCE * usual, settings.evidence)
