@@ -38,6 +38,9 @@ _WORSE = 1.5
 _MISFIT, _LEAST_MISFIT = 2.0, 0.1
 """A fit whose noise is this many times the least of the last five, and this part of its height, has met
 something else."""
+_FITS_NOT = 0.35
+"""Noise, in heights, above which such a fit is none."""
+_ACROSS = 3.0
 _STEPS_ACROSS = (0.5, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
@@ -157,7 +160,11 @@ def _fit_next(
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
     if not found[2] and not gap and _misfits(found[1], chain):
-        return _across(rough, chain, settings) or _round_corner(rough, chain, settings) or found
+        other = _across(rough, chain, settings) or _round_corner(rough, chain, settings)
+        if other is not None:
+            return other
+        hopeless = found[1].scale > _FITS_NOT * abs(found[1].height)
+        return (*found[:2], "no ridge: what follows has another section") if hopeless else found
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
         return _round_corner(rough, chain, settings) or found
     if not found[2].startswith(FLAT):
@@ -178,21 +185,19 @@ def _misfits(fitted: Template, chain: list[Template]) -> bool:
 def _across(
     rough: Window, chain: list[Template], settings: Settings
 ) -> tuple[Template, Template, str] | None:
-    """The next template straight on beyond a place where other ridges join this one, if it fits as usual."""
+    """The next template straight on beyond a place where other ridges join this one, the best fit of two."""
     last, straight = chain[-1], append(chain[-1:], settings)[0]
+    usual = min(t.scale for t in chain[-_USUAL:])
+    found = []
     for step in _STEPS_ACROSS:
         start = straight.changed(
             position=straight.position + step * settings.look_ahead * last.width * last.rotation[:, 0]
         )
         fitted = improve(rough, start, settings)
-        if (
-            _alike(fitted, last)
-            and not _reject(fitted, start, settings, gap=True)
-            and not _misfits(fitted, chain)
-            and _met(fitted, chain[:-1]) < 0
-        ):
-            return start, fitted, ""
-    return None
+        good = _alike(fitted, last) and not _reject(fitted, start, settings, gap=True)
+        if good and fitted.scale < _ACROSS * usual and _met(fitted, chain[:-1]) < 0:
+            found.append((start, fitted, ""))
+    return min(found, key=lambda best: best[1].scale, default=None)
 
 
 def _alike(fitted: Template, last: Template) -> bool:
