@@ -34,6 +34,8 @@ _BLOCK = 5
 """Nodes over which noise may be correlated."""
 _MEDIAN = 0.89
 """Median of chi-square with six degrees of freedom, by its mean."""
+_FAR_OFF = 25.0
+"""Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -72,6 +74,9 @@ class Joint:
     """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
     counts: Array
     """(n - 1,) points of each stretch, strays too."""
+    misfit: Array
+    """(n - 1, 2) points of each stretch between the feet, and the sum of their squared distances from the
+    surface in noise scales, none more than 25."""
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
@@ -159,7 +164,19 @@ def fit_whole(
             break
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=len(middle))[: len(middle)]
     shape = section_std(some, terms, section, noise.told, inflation)
-    return Joint(path, smooth, terms, section, matrix, goal, counts.astype(float), noise, inflation, shape)
+    misfit = _misfit(some, terms, section, noise)
+    return Joint(
+        path, smooth, terms, section, matrix, goal, counts.astype(float), misfit, noise, inflation, shape
+    )
+
+
+def _misfit(points: Array, terms: Array, section: Section, noise: Noise) -> Array:
+    """(n - 1, 2) as Joint.misfit has it."""
+    place = points[:, 0].astype(np.int64)
+    on = np.abs(points[:, 1] - terms[place, E]) < 0.5 * terms[place, W]
+    far = np.minimum((offsets(points[on], terms, section.table) / noise.scale) ** 2, _FAR_OFF)
+    both = [np.bincount(place[on], weights, len(terms) - 1) for weights in (None, far)]
+    return np.column_stack(both).astype(np.float64)
 
 
 def _linearised(
