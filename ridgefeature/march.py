@@ -40,14 +40,16 @@ _MISFIT, _LEAST_MISFIT = 2.0, 0.1
 something else."""
 _FITS_NOT = 0.35
 """Noise, in heights, above which such a fit is none."""
-_ACROSS = 3.0
 _STEPS_ACROSS = (0.5, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
 _CORNERS_TRIED = 3
 _CORNER_RADIUS = 0.5
-_CORNER_EVIDENCE = 0.3
-"""Evidence of a template behind a sharp bend, in parts of that of the one before."""
+_ABOUT_STRAIGHT = (-30.0, 30.0)
+_WORSE_ACROSS = (3.0, 1.5)
+"""Most noise of a template beyond a crossing, straight on and in a bend, in the least of the last five."""
+_BEYOND_EVIDENCE = 0.3
+"""Least evidence of a template behind a bend or crossing, in parts of that of the one before."""
 _USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
@@ -185,19 +187,44 @@ def _misfits(fitted: Template, chain: list[Template]) -> bool:
 def _across(
     rough: Window, chain: list[Template], settings: Settings
 ) -> tuple[Template, Template, str] | None:
-    """The next template straight on beyond a place where other ridges join this one, the best fit of two."""
-    last, straight = chain[-1], append(chain[-1:], settings)[0]
-    usual = min(t.scale for t in chain[-_USUAL:])
-    found = []
-    for step in _STEPS_ACROSS:
-        start = straight.changed(
-            position=straight.position + step * settings.look_ahead * last.width * last.rotation[:, 0]
-        )
-        fitted = improve(rough, start, settings)
-        good = _alike(fitted, last) and not _reject(fitted, start, settings, gap=True)
-        if good and fitted.scale < _ACROSS * usual and _met(fitted, chain[:-1]) < 0:
-            found.append((start, fitted, ""))
-    return min(found, key=lambda best: best[1].scale, default=None)
+    """The next template beyond a place where other ridges join this one: straight on, or nearly so."""
+    last, straight = chain[-1], append(chain[-1:], settings)[:1]
+    sure = last.scale < _LEAST_MISFIT * abs(last.height)  # a poor fit does not tell which way is straight
+    bent = corners(chain, settings, _ABOUT_STRAIGHT) if sure else []
+    ahead = settings.look_ahead * last.width
+    for starts, worse in ((straight, _WORSE_ACROSS[0]), (bent, _WORSE_ACROSS[1])):
+        beyond = [
+            start.changed(position=start.position + step * ahead * start.rotation[:, 0])
+            for start in starts
+            for step in _STEPS_ACROSS
+        ]
+        found = _best_beyond(rough, chain, beyond, settings, worse)
+        if found is not None:
+            return found
+    return None
+
+
+def _best_beyond(
+    rough: Window, chain: list[Template], starts: list[Template], settings: Settings, worse: float = math.inf
+) -> tuple[Template, Template, str] | None:
+    """The best fit from starts behind a crossing or a bend, where the ridge goes on there beyond doubt.
+
+    worse: most noise, in the least of the last five.
+    """
+    last, least = chain[-1], min(t.scale for t in chain[-_USUAL:])
+    found = [(start, improve(rough, start, settings), "") for start in starts]
+    for start, fitted, why in sorted(found, key=lambda best: best[1].scale):
+        # By point: the last one may have been fitted to all points of its window, this one to some.
+        usual = last.evidence / max(last.points, 1) * fitted.points
+        if (
+            fitted.evidence > max(_BEYOND_EVIDENCE * usual, settings.evidence)
+            and fitted.scale < worse * least
+            and _alike(fitted, last)
+            and not _reject(fitted, start, settings, gap=True)
+            and _met(fitted, chain[:-1]) < 0
+        ):
+            return start, fitted, why
+    return None
 
 
 def _alike(fitted: Template, last: Template) -> bool:
@@ -205,8 +232,10 @@ def _alike(fitted: Template, last: Template) -> bool:
     return 0.75 < fitted.width / last.width < 1.33 and 0.6 < fitted.height / last.height < 1.6
 
 
-def corners(chain: list[Template], settings: Settings) -> list[Template]:
-    """Starts of the next template behind a sharp bend, 30 to 90 degrees to either side.
+def corners(
+    chain: list[Template], settings: Settings, angles: tuple[float, ...] = _CORNERS
+) -> list[Template]:
+    """Starts of the next template behind a sharp bend, by angles in degrees, to either side.
 
     The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on.
     """
@@ -214,7 +243,7 @@ def corners(chain: list[Template], settings: Settings) -> list[Template]:
     straight = append(chain[-1:], settings)[0]
     along, left, up = last.rotation.T
     found = []
-    for angle in np.radians(_CORNERS):
+    for angle in np.radians(angles):
         radius = _CORNER_RADIUS * last.width * np.sign(angle)
         ahead = np.cos(angle) * along + np.sin(angle) * left
         corner = last.end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
@@ -227,21 +256,9 @@ def _round_corner(
     rough: Window, chain: list[Template], settings: Settings
 ) -> tuple[Template, Template, str] | None:
     """The next template behind a sharp bend, where the ridge goes on there beyond doubt."""
-    last = chain[-1]
-    starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, last.scale))
-    found = [(start, improve(rough, start, settings)) for start in starts[:_CORNERS_TRIED]]
-    for start, fitted in sorted(found, key=lambda pair: pair[1].scale):
-        # By point: the last one may have been fitted to all points of its window, this one to some.
-        usual = last.evidence / max(last.points, 1) * fitted.points
-        clear = fitted.evidence > max(_CORNER_EVIDENCE * usual, settings.evidence)
-        if (
-            clear
-            and _alike(fitted, last)
-            and not _reject(fitted, start, settings, gap=True)
-            and _met(fitted, chain[:-1]) < 0
-        ):
-            return start, fitted, ""
-    return None
+    scale = chain[-1].scale
+    starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, scale))
+    return _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
 
 
 def _without_last(chain: list[Template], settings: Settings) -> list[Template]:

@@ -133,7 +133,7 @@ def _same_ridge(misfit: Array, terms: Array, start: int, end: int) -> int:
             for x in (H, W)
         )
         other = other or misfit * (max(height, width) - 1.0) > _OTHER or height < _LEAST_PART
-        cut = k if other else cut
+        cut = k + half // 2 if other else cut
     return cut
 
 
