@@ -37,7 +37,11 @@ _LIKELY = 6.0
 _ANYTHING = 3.84
 _MISFIT = 2.5
 """Mean squared distance of points, in that usual, above which a stretch may be something else."""
-_OTHER, _LEAST_PART = 5.0, 0.15
+_LEAST_NOISE = 0.5
+"""Of mean squared distances, in that of the noise: exact data are no nearer to it."""
+_MARGIN = 2
+"""Stretches at the very end that are not looked at: they may lie beyond it."""
+_OTHER, _LEAST_PART = 3.5, 0.15
 """It is, where that times the growth of height or width, in those of the stretch before, is more; or where
 the height, in those, is less."""
 _STRETCH, _LATEST = 3, 4
@@ -120,10 +124,10 @@ def _same_ridge(misfit: Array, terms: Array, start: int, end: int) -> int:
     half, back = NODES_A_WIDTH // 2, _STRETCH * NODES_A_WIDTH
     sums = _windows(misfit, half)
     noise = sums[:, 1] / np.maximum(sums[:, 0], 1.0)
-    usual = float(np.median(noise[start : max(end - half, start) + 1]))
+    usual = max(float(np.median(noise[start : max(end - half, start) + 1])), _LEAST_NOISE)
     cut, other = end, False
-    for k in range(end - half, max(start + NODES_A_WIDTH, end - _LATEST * NODES_A_WIDTH), -1):
-        misfit = float(noise[k]) / usual if usual > 0 else 0.0
+    for k in range(end - half - _MARGIN, max(start + NODES_A_WIDTH, end - _LATEST * NODES_A_WIDTH), -1):
+        misfit = float(noise[k]) / usual
         before = terms[max(start, k - half - back) : k - half + 1]
         if misfit < _MISFIT or len(before) < NODES_A_WIDTH:
             other = False
