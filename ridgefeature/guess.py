@@ -118,22 +118,28 @@ def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: S
 
 
 def guess(
-    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
+    window: Window,
+    pick: Array,
+    extent: float,
+    hints: Hints,
+    section: Section,
+    settings: Settings,
+    aimed: bool = True,
 ) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
-    neither a smooth surface nor an edge explains as well, if there are any. `extent`,
-    about the diameter of the scan, bounds the widths. A hinted direction (to 10 degrees) and width leave less
-    to try.
+    neither a smooth surface nor an edge explains as well, if there are any. aimed: of ridges side by side the
+    one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
+    direction (to 10 degrees) and width leave less to try.
     """
     best: tuple[bool, float, Template] | None = None
     for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
         if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
-        score = _score(window, fitted, pick)
+        score = _score(window, fitted, pick, aimed)
         if score <= 0 or fitted.width > settings.widest * extent:
             continue
         if best is not None and best[0] and score <= best[1]:
@@ -158,10 +164,10 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
     return curved
 
 
-def _score(window: Window, template: Template, pick: Array) -> float:
+def _score(window: Window, template: Template, pick: Array, aimed: bool = False) -> float:
     """How well a template explains its window, counting 300 points at most; 0 if it misses the pick.
 
-    Less if it lies beside the pick: where ridges lie side by side the one that was aimed at is meant.
+    aimed: less if it lies beside the pick. Where ridges lie side by side the one that was aimed at is meant.
     """
     if template.status in ("failed", "no data") or template.height == 0:
         return 0.0
@@ -169,5 +175,5 @@ def _score(window: Window, template: Template, pick: Array) -> float:
     if abs(local[1]) > 0.55 * template.width:
         return 0.0
     points = window(template)
-    near = math.exp(-0.5 * (local[1] / (_AIM * template.width)) ** 2)
+    near = math.exp(-0.5 * (local[1] / (_AIM * template.width)) ** 2) if aimed else 1.0
     return near * min(len(points), 300) * float(explained(points, *template.shape))

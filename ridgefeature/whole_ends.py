@@ -127,16 +127,16 @@ def _same_ridge(misfit: Array, terms: Array, start: int, end: int) -> int:
     usual = max(float(np.median(noise[start : max(end - half, start) + 1])), _LEAST_NOISE)
     cut, other = end, False
     for k in range(end - half - _MARGIN, max(start + NODES_A_WIDTH, end - _LATEST * NODES_A_WIDTH), -1):
-        misfit = float(noise[k]) / usual
+        far = float(noise[k]) / usual
         before = terms[max(start, k - half - back) : k - half + 1]
-        if misfit < _MISFIT or len(before) < NODES_A_WIDTH:
+        if far < _MISFIT or len(before) < NODES_A_WIDTH:
             other = False
             continue
         height, width = (
             float(np.median(np.abs(terms[k : k + half + 1, x])) / np.median(np.abs(before[:, x])))
             for x in (H, W)
         )
-        other = other or misfit * (max(height, width) - 1.0) > _OTHER or height < _LEAST_PART
+        other = other or far * (max(height, width) - 1.0) > _OTHER or height < _LEAST_PART
         cut = k + half // 2 if other else cut
     return cut
 
