@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.continuation import FLAT
 from ridgefeature.curvature import Found, curved, joined, terms_of
 from ridgefeature.ends import place_ends, trends
 from ridgefeature.improve import Limits, judge, limits_of, refine
 from ridgefeature.kernels import appraise
-from ridgefeature.march import FLAT, Track
+from ridgefeature.march import Track
 from ridgefeature.neighbours import FEWEST, advances, between, follows, tipped
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template

@@ -10,7 +10,8 @@ import pytest
 from oracles import window_on
 
 import ridgefeature as rf
-from ridgefeature.march import FLAT, Track
+from ridgefeature.continuation import FLAT
+from ridgefeature.march import Track
 from ridgefeature.section import Section, cosine, plateau
 from ridgefeature.settle import settle
 from ridgefeature.stations import lay_out
