@@ -29,6 +29,10 @@ _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
 _DISTINCT = 0.1
 """What one template must have of the evidence that tells a whole ridge from other surfaces."""
+_SEEN_ON_BASE = 0.5
+"""Points that a fit on a curved base must see, in those on a flat one: it fits few of them easily."""
+_AIM = 0.25
+"""Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
 _OFFSETS = np.array([-0.3, 0.0, 0.3])
 
@@ -114,22 +118,28 @@ def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: S
 
 
 def guess(
-    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
+    window: Window,
+    pick: Array,
+    extent: float,
+    hints: Hints,
+    section: Section,
+    settings: Settings,
+    aimed: bool = True,
 ) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
-    neither a smooth surface nor an edge explains as well, if there are any. `extent`,
-    about the diameter of the scan, bounds the widths. A hinted direction (to 10 degrees) and width leave less
-    to try.
+    neither a smooth surface nor an edge explains as well, if there are any. aimed: of ridges side by side the
+    one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
+    direction (to 10 degrees) and width leave less to try.
     """
     best: tuple[bool, float, Template] | None = None
     for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
         if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
-        score = _score(window, fitted, pick)
+        score = _score(window, fitted, pick, aimed)
         if score <= 0 or fitted.width > settings.widest * extent:
             continue
         if best is not None and best[0] and score <= best[1]:
@@ -149,15 +159,21 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
     curved = improve_on_base(window, start, settings)
     if curved is None or not less_noisy(curved, flat) or _score(window, curved, pick) <= 0:
         return flat
+    if curved.points < _SEEN_ON_BASE * flat.points:
+        return flat
     return curved
 
 
-def _score(window: Window, template: Template, pick: Array) -> float:
-    """How well a template explains its window, counting 300 points at most; 0 if it misses the pick."""
+def _score(window: Window, template: Template, pick: Array, aimed: bool = False) -> float:
+    """How well a template explains its window, counting 300 points at most; 0 if it misses the pick.
+
+    aimed: less if it lies beside the pick. Where ridges lie side by side the one that was aimed at is meant.
+    """
     if template.status in ("failed", "no data") or template.height == 0:
         return 0.0
     local = template.rotation.T @ (pick - template.position)
     if abs(local[1]) > 0.55 * template.width:
         return 0.0
     points = window(template)
-    return min(len(points), 300) * float(explained(points, *template.shape))
+    near = math.exp(-0.5 * (local[1] / (_AIM * template.width)) ** 2) if aimed else 1.0
+    return near * min(len(points), 300) * float(explained(points, *template.shape))

@@ -26,7 +26,7 @@ from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, with_half_height_width
-from ridgefeature.smearing import log_likelihood, smear
+from ridgefeature.smearing import Smeared, log_likelihood, smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
 
 Array = NDArray[np.float64]
@@ -44,6 +44,8 @@ _TELLING = 5000
 """As many points tell which it is."""
 _STEEP = 0.4
 """Height by width from which on it matters how a fit begins."""
+_FAR_OFF = 25.0
+"""Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -61,6 +63,9 @@ class Joint:
     """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
     counts: Array
     """(n - 1,) points of each stretch, strays too."""
+    misfit: Array
+    """(n - 1, 2) points of each stretch between the feet, and the sum of their squared distances from the
+    surface in noise scales, none more than 25."""
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
@@ -227,9 +232,19 @@ def _joint(points: Array, some: Array, path: PathFrame, state: _State) -> Joint:
     terms, noise, inflation = state.terms, state.noise, state.inflation
     seen = smear(state.section, terms, noise.blur, noise.even)
     shape = section_std(some, terms, seen, noise.told, inflation)
+    misfit = _misfit(some, terms, seen, noise.scale)
     smooth, matrix, goal = state.smooth, state.matrix, state.goal
     assert smooth is not None and matrix is not None and goal is not None
-    return Joint(path, smooth, terms, state.section, matrix, goal, counts, noise, inflation, shape)
+    return Joint(path, smooth, terms, state.section, matrix, goal, counts, misfit, noise, inflation, shape)
+
+
+def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:
+    """(n - 1, 2) as Joint.misfit has it."""
+    place = points[:, 0].astype(np.int64)
+    on = np.abs(points[:, 1] - terms[place, E]) < 0.5 * terms[place, W]
+    far = np.minimum((offsets(points[on], terms, seen.told, scale)[0] / scale) ** 2, _FAR_OFF)
+    both = [np.bincount(place[on], weights, len(terms) - 1) for weights in (None, far)]
+    return np.column_stack(both).astype(np.float64)
 
 
 def _linearised(points: Array, some: Array, state: _State, least: float) -> tuple[Array, Array, Noise, float]:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvature import Ahead, Found, starts_on_base
-from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.neighbours import LEAST_ADVANCE, comes_home
+from ridgefeature.continuation import FLAT, across, append, met, misfits, outgrown, reject, round_corner
+from ridgefeature.curvature import Ahead, Found
+from ridgefeature.improve import improve, start_loss
+from ridgefeature.neighbours import comes_home
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -25,7 +26,6 @@ _RAN_BACK = "it ran back into itself"
 CAME_HOME = "it came back to where it began"
 GOES_ON = (INTERRUPTED, _RAN_BACK, CAME_HOME, "max_templates")
 """How the reasons of a march begin that stopped though the ridge goes on."""
-FLAT = "no ridge: the data agree with a flat base"
 _WEAK = 5.0
 """Evidence in parts of what is needed to go on, below which a ridge hardly stands out."""
 _ALIKE = math.cos(math.radians(8.0))
@@ -34,15 +34,9 @@ _POOR_START = 0.5
 _HOPELESS = 3.0
 """Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
-"""A fit whose noise is this many times that of the last three templates is suspect."""
-_CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
-_CORNER_RADIUS = 0.5
-_CORNER_EVIDENCE = 0.3
-"""Evidence of a template behind a sharp bend, in parts of that of the one before."""
-_USUAL = 5
-_OUTGROWN = 2.5
-"""Width of a template, in parts of the median of the last five, that is another ridge's."""
-_LARGEST_TURN = np.radians(60.0)
+"""A fit whose noise is this many times that usual of the last three templates is suspect."""
+_FITS_NOT = 0.35
+"""Noise, in heights, above which such a fit is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,79 +61,6 @@ def reverse(template: Template) -> Template:
     )
 
 
-def append(chain: list[Template], settings: Settings, longest: bool = False) -> list[Template]:
-    """Starts of the next template, one for each way the ridge may go on.
-
-    The first row lies on the last row of the last template of the chain; width and height are kept; the base
-    is that of the last three together. The ridge goes on turning as the last three centres do, or straight
-    on, along the chord of the last two centres or along the last template's own direction, whatever the data
-    then favour: a chord is known better, but lags at a kink.
-    """
-    last, near = chain[-1], chain[-3:]
-    length = sized(last, settings).length
-    if longest:
-        length = settings.longest * settings.length * last.width
-    positions = np.array([t.position for t in near])
-    frames = np.array([t.rotation for t in near])
-    start = last.changed(
-        length=length,
-        flank=settings.flank * last.width,
-        trend=np.zeros(3),
-        std=None,
-        evidence=0.0,
-        status="start",
-    )
-    found = starts_on_base(last, positions, frames, length)
-    return [start.changed(position=place, rotation=axes) for place, axes in zip(*found, strict=True)]
-
-
-def _reject(fitted: Template, start: Template, settings: Settings, gap: bool = False) -> str:
-    """Why a fitted template is no continuation of its start, beyond a gap or not; empty if it is one."""
-    if fitted.points < FEWEST_POINTS or fitted.status == "no data":
-        return "the data end here"
-    if fitted.evidence < settings.going_on:
-        return FLAT
-    if fitted.height * start.height <= 0 or abs(fitted.height) > 2.5 * abs(start.height):
-        return "no ridge: the height jumped"
-    if gap and (fitted.evidence < settings.evidence or not 0.5 < fitted.height / start.height < 2.0):
-        return "no ridge: what follows the gap is another one"
-    if not 0.55 < fitted.width / start.width < 1.8:
-        return "no ridge: the width jumped"
-    local = start.rotation.T @ (fitted.position - start.position)
-    if local[0] < (LEAST_ADVANCE - 1.0) * start.length:
-        return "no ridge: it turned back"
-    if abs(local[1]) > 0.5 * start.width or abs(local[2]) > 0.5 * start.width + abs(start.height):
-        return "no ridge: the spine jumped"
-    if fitted.rotation[:, 0] @ start.rotation[:, 0] < np.cos(_LARGEST_TURN):
-        return "no ridge: the direction jumped"
-    if fitted.rotation[:, 2] @ start.rotation[:, 2] < np.cos(_LARGEST_TURN):
-        return "no ridge: the base tipped"
-    return ""
-
-
-def _outgrown(fitted: Template, chain: list[Template]) -> str:
-    """Why a template is no part of a ridge as the last ones show it: another, wider rise under it."""
-    usual = statistics.median(t.width for t in chain[-_USUAL:])
-    return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
-
-
-def _met(template: Template, others: list[Template]) -> int:
-    """Which of the others a template lies on, the first of them; -1 for none."""
-    if not others:
-        return -1
-    apart = np.array([other.position for other in others]) - template.position
-    for i in np.flatnonzero((apart * apart).sum(axis=1) < (2 * (template.length + template.width)) ** 2):
-        other = others[i]
-        local = other.rotation.T @ apart[i]
-        if (
-            abs(local[0]) < 0.5 * other.length
-            and abs(local[1]) < 0.5 * other.width
-            and abs(local[2]) < other.width
-        ):
-            return int(i)
-    return -1
-
-
 def _fit_next(
     rough: Window, full: Window, chain: list[Template], gap: bool, settings: Settings
 ) -> tuple[Template, Template, str]:
@@ -150,8 +71,14 @@ def _fit_next(
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    if not found[2] and not gap and misfits(found[1], chain):
+        other = across(rough, chain, settings) or round_corner(rough, chain, settings)
+        if other is not None:
+            return other
+        hopeless = found[1].scale > _FITS_NOT * abs(found[1].height)
+        return (*found[:2], "no ridge: what follows has another section") if hopeless else found
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
-        return _round_corner(rough, chain, settings) or found
+        return round_corner(rough, chain, settings) or found
     if not found[2].startswith(FLAT):
         return found
     for known in (chain, _without_last(chain, settings)):
@@ -159,44 +86,6 @@ def _fit_next(
         if not longer[2]:
             return longer
     return found
-
-
-def corners(chain: list[Template], settings: Settings) -> list[Template]:
-    """Starts of the next template behind a sharp bend, 30 to 90 degrees to either side.
-
-    The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on.
-    """
-    last = chain[-1]
-    straight = append(chain[-1:], settings)[0]
-    along, left, up = last.rotation.T
-    found = []
-    for angle in np.radians(_CORNERS):
-        radius = _CORNER_RADIUS * last.width * np.sign(angle)
-        ahead = np.cos(angle) * along + np.sin(angle) * left
-        corner = last.end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
-        axes = np.column_stack([ahead, np.cross(up, ahead), up])
-        found.append(straight.changed(position=corner + 0.5 * straight.length * ahead, rotation=axes))
-    return found
-
-
-def _round_corner(
-    rough: Window, chain: list[Template], settings: Settings
-) -> tuple[Template, Template, str] | None:
-    """The next template behind a sharp bend, where the ridge goes on there beyond doubt."""
-    last = chain[-1]
-    starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, last.scale))
-    for start in starts[:2]:
-        fitted = improve(rough, start, settings)
-        clear = fitted.evidence > max(_CORNER_EVIDENCE * last.evidence, settings.evidence)
-        alike = 0.75 < fitted.width / last.width < 1.33 and 0.6 < fitted.height / last.height < 1.6
-        if (
-            clear
-            and alike
-            and not _reject(fitted, start, settings, gap=True)
-            and _met(fitted, chain[:-1]) < 0
-        ):
-            return start, fitted, ""
-    return None
 
 
 def _without_last(chain: list[Template], settings: Settings) -> list[Template]:
@@ -212,7 +101,7 @@ def _fit_best(
 ) -> tuple[Template, Template, str]:
     """The start whose fit is best, this fit, and why it is none."""
     starts, alike = _unlike(starts)
-    suspect = _WORSE * max(t.scale for t in chain[-3:])
+    suspect = _WORSE * statistics.median(t.scale for t in chain[-3:])
     if len(starts) > 1 and start_loss(rough, starts[0], chain[-1].scale) > _POOR_START:
         starts.sort(key=lambda start: start_loss(rough, start, chain[-1].scale))
     best: tuple[Template, Template, str] | None = None
@@ -221,7 +110,7 @@ def _fit_best(
         if best is not None and i >= len(starts) and best[1].evidence < _HOPELESS:
             break
         fitted = improve(window, start, settings)
-        why = _reject(fitted, start, settings, gap) or _outgrown(fitted, chain)
+        why = reject(fitted, start, settings, gap) or outgrown(fitted, chain)
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
         if fitted.status == "no data" or (not why and fitted.scale < suspect):
@@ -264,9 +153,9 @@ def march_one_way(
             chain.append(start)
             continue
         whole = [*known, *found]
-        met = _met(fitted, whole[:-2])
-        if met >= 0:
-            return CAME_HOME if comes_home(fitted, whole, met) else reason or _RAN_BACK
+        on = met(fitted, whole[:-2])
+        if on >= 0:
+            return CAME_HOME if comes_home(fitted, whole, on) else reason or _RAN_BACK
         reason, skipped = "", 0.0
         found.append(fitted)
         chain.append(base.add(rough, fitted))

@@ -15,6 +15,8 @@ from ridgefeature.template import Template
 Array = NDArray[np.float64]
 LEAST_ADVANCE = 0.4
 """Least distance between centres along their common direction, in parts of their mean length."""
+_FACES_BACK = math.cos(math.radians(120.0))
+"""Templates on both sides of a corner may turn by more than a right angle."""
 _TIPPED = math.cos(math.radians(35.0))
 FEWEST = 4
 """Templates of the smallest ring."""
@@ -30,7 +32,7 @@ _UNSURE = 2.0
 def advances(before: Template, after: Template) -> bool:
     """Whether a template lies ahead of the one before it and does not face back."""
     x, y = before.rotation[:, 0], after.rotation[:, 0]
-    if x @ y < 0:
+    if x @ y < _FACES_BACK:
         return False
     ahead = float((after.position - before.position) @ (x + y)) / float(np.linalg.norm(x + y))
     return ahead >= LEAST_ADVANCE * 0.5 * (before.length + after.length)

@@ -70,9 +70,13 @@ def register(
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
     _check_pick(grid, pick, spacing, extent)
     full = Window(grid, spacing)
-    track = _directed(
-        _track(full.thinned(_ROUGH_POINTS), full, pick, extent, hints, settings, progress), pick, hints
-    )
+    rough = full.thinned(_ROUGH_POINTS)
+    try:
+        track = _track(rough, full, pick, extent, hints, settings, progress)
+    except NoRidgeError:
+        # What lies nearest to the pick is none: what explains most about it may be one.
+        track = _track(rough, full, pick, extent, hints, settings, progress, aimed=False)
+    track = _directed(track, pick, hints)
     templates = _with_distances(track.templates, grid)
     stations, section, intervals = lay_out(templates, settings, track.closed), templates[0].section, None
     if settings.measure == "residual":
@@ -102,9 +106,10 @@ def _track(
     hints: Hints,
     settings: Settings,
     progress: Progress | None,
+    aimed: bool = True,
 ) -> Track:
     """The whole fit: march, ends placed, templates settled; settled again where another section is better."""
-    first = guess(rough, pick, extent, hints, first_section(settings), settings)
+    first = guess(rough, pick, extent, hints, first_section(settings), settings, aimed)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(

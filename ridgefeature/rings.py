@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.continuation import FLAT
 from ridgefeature.ends import trends
 from ridgefeature.improve import improve, loss_of
 from ridgefeature.kernels import appraise
-from ridgefeature.march import FLAT, Track
+from ridgefeature.march import Track
 from ridgefeature.neighbours import FEWEST, HOME, TYPICAL, advances, alike, between
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template

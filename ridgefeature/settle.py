@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.continuation import FLAT
 from ridgefeature.curvature import Found, curved, joined, terms_of
 from ridgefeature.ends import place_ends, trends
 from ridgefeature.improve import Limits, judge, limits_of, refine
 from ridgefeature.kernels import appraise
 from ridgefeature.march import Track
-from ridgefeature.neighbours import advances, between, follows, tipped
+from ridgefeature.neighbours import FEWEST, advances, between, follows, tipped
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -56,6 +57,8 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
             told[id(new)] = terms_of(points, new, settings)
         judged.append(new)
     mended = mend(window, known, judged, track.closed, settings)
+    if track.closed and len(mended) < FEWEST:
+        track = replace(track, closed=False, stop=(FLAT, FLAT))
     if settings.flat:
         return replace(track, templates=tuple(mended), misfit=bins)
     base = [told.get(id(t)) or terms_of(window(t), t, settings) for t in mended]

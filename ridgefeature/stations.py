@@ -218,7 +218,9 @@ def _sizes(
     # Beyond the last centres both go on straight, but neither vanishes nor changes its sign.
     sign = 1.0 if np.median(heights) > 0 else -1.0
     height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
-    height_std, width_std, spine_std = np.sqrt(spread**2 @ std**2).T
+    known = np.where(np.isfinite(std), std, 0.0)
+    unknown = (np.abs(spread) > 1e-9) @ ~np.isfinite(std)  # a product of 0 and infinity is no number
+    height_std, width_std, spine_std = np.where(unknown, np.inf, np.sqrt(spread**2 @ known**2)).T
     return {
         "height": height,
         "width": width,

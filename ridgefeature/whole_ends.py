@@ -35,6 +35,17 @@ _BEFORE = (1.5, 0.4)
 _LIKELY = 6.0
 """Twice the log likelihood ratio up to which a place may be the end: of a change point, at 95 %."""
 _ANYTHING = 3.84
+_MISFIT = 2.5
+"""Mean squared distance of points, in that usual, above which a stretch may be something else."""
+_LEAST_NOISE = 0.02
+"""Distance of points, in heights, that a section may always miss by."""
+_MARGIN = 2
+"""Stretches at the very end that are not looked at: they may lie beyond it."""
+_OTHER, _LEAST_PART = 3.5, 0.15
+"""It is, where that times the growth of height or width, in those of the stretch before, is more; or where
+the height, in those, is less."""
+_STRETCH, _LATEST = 3, 4
+"""Widths of the stretch before, and of the last part of a ridge that is looked at."""
 _FADED = 0.5
 """Height at an end, in usual heights, below which the ridge fades there."""
 _FADING, _SLACK = 0.25, 0.2
@@ -93,7 +104,42 @@ def ends_of(joint: Joint, start: float, end: float, open_ends: tuple[bool, bool]
         seen = (found > VISIBLE) & (half[: len(found)] > _OUTER)
         k = last - _end(seen[::-1], height[::-1], dense[::-1], joint.terms[::-1, H], last - low, one, near)
         start = start if k == low else float(path.at[k])
+    least = (_LEAST_NOISE * float(np.median(np.abs(path.height[inside]))) / joint.noise.scale) ** 2
+    low, high = int(np.searchsorted(path.at, start)), int(np.searchsorted(path.at, end, "right")) - 1
+    if open_ends[1]:
+        k = _same_ridge(joint.misfit, joint.terms, least, low, high)
+        end = end if k == high else float(path.at[k])
+    if open_ends[0]:
+        last = len(path.at) - 1
+        k = last - _same_ridge(joint.misfit[::-1], joint.terms[::-1], least, last - high, last - low)
+        start = start if k == low else float(path.at[k])
     return start, end
+
+
+def _same_ridge(misfit: Array, terms: Array, least: float, start: int, end: int) -> int:
+    """The node up to which a ridge from `start` to `end` is the same one, looked at from its end.
+
+    Where it runs into something else (a blob, a body, another ridge) its points no longer fit, and height or
+    width leave what the stretch before showed. What fits is the ridge, however it grows or fades.
+    """
+    half, back = NODES_A_WIDTH // 2, _STRETCH * NODES_A_WIDTH
+    sums = _windows(misfit, half)
+    noise = sums[:, 1] / np.maximum(sums[:, 0], 1.0)
+    usual = max(float(np.median(noise[start : max(end - half, start) + 1])), least)
+    cut, other = end, False
+    for k in range(end - half - _MARGIN, max(start + NODES_A_WIDTH, end - _LATEST * NODES_A_WIDTH), -1):
+        far = float(noise[k]) / usual
+        before = terms[max(start, k - half - back) : k - half + 1]
+        if far < _MISFIT or len(before) < NODES_A_WIDTH:
+            other = False
+            continue
+        height, width = (
+            float(np.median(np.abs(terms[k : k + half + 1, x])) / np.median(np.abs(before[:, x])))
+            for x in (H, W)
+        )
+        other = other or far * (max(height, width) - 1.0) > _OTHER or height < _LEAST_PART
+        cut = k + half // 2 if other else cut
+    return cut
 
 
 def _end(seen: Flags, height: Array, dense: Flags, known: Array, i: int, one: int, near: int) -> int:

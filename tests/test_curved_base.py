@@ -13,11 +13,11 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import ridgefeature as rf
+from ridgefeature.continuation import append
 from ridgefeature.curvature import Found, curved
 from ridgefeature.io.feature import from_document, to_document
 from ridgefeature.kernels.base import flattened, on_base, standing
 from ridgefeature.kernels.base_terms import found_terms, smoothed
-from ridgefeature.march import append
 from ridgefeature.section import bell, plateau
 
 H, W, NOISE = 3.0, 10.0, 0.06

@@ -9,8 +9,9 @@ import pytest
 from oracles import PICK, SPIRAL, apex, bell, spiral_points, spiral_ridge, window_on
 
 import ridgefeature as rf
+from ridgefeature.continuation import append
 from ridgefeature.guess import Hints, guess
-from ridgefeature.march import append, march, reverse
+from ridgefeature.march import march, reverse
 from ridgefeature.synthetic import Spiral
 
 SETTINGS = rf.Settings()

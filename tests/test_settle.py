@@ -240,8 +240,10 @@ def test_what_advances_and_what_does_not():
     here = template_at()
     assert advances(here, here.slid(6.4)) and advances(here, here.slid(2.6))
     assert not advances(here, here.slid(2.5)) and not advances(here, here.slid(-6.4))
-    back = here.slid(6.4).changed(rotation=Rotation.from_rotvec([0, 0, 1.7]).as_matrix())
-    assert not advances(here, back)
+    for turn, on in ((1.9, True), (2.3, False)):  # behind a tight bend; back
+        turned = here.slid(6.4).changed(rotation=Rotation.from_rotvec([0, 0, turn]).as_matrix())
+        ahead = turned.changed(position=here.position + 6.4 * (here.rotation[:, 0] + turned.rotation[:, 0]))
+        assert advances(here, ahead) == on
     chain = line(4)
     assert follows(chain, 0, closed=False) and not follows(chain, 0, closed=True)
 
