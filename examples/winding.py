@@ -37,7 +37,8 @@ class Winding:
         along = ((xy - self.path[i]) * tangent).sum(axis=1)
         s = np.clip(self.arc_length[i] + along, 0.0, self.arc_length[-1])
         inside = s == self.arc_length[i] + along
-        across = np.abs(np.cross(tangent, xy - self.path[i]))
+        aside = xy - self.path[i]
+        across = np.abs(tangent[..., 0] * aside[..., 1] - tangent[..., 1] * aside[..., 0])
         return s, np.where(inside, across, np.linalg.norm(xy - self.path[i], axis=1))
 
     def points(self, n: int, region: float, noise: float, seed: int = 0) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.merge import along
-from ridgefeature.stations import Stations
+from ridgefeature.stations import Stations, unit
 
 Array = NDArray[np.float64]
 
@@ -138,11 +138,6 @@ def _integral(values: Array, step: float) -> Array:
     """Integral up to every second place of values (2 n + 1, ...) at even places, by Simpson's rule."""
     pieces = step / 3 * (values[:-2:2] + 4 * values[1::2] + values[2::2])
     return np.concatenate([np.zeros_like(pieces[:1]), np.cumsum(pieces, axis=0)])
-
-
-def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) at length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), dtype=np.float64)
 
 
 def _vector(value: ArrayLike, name: str) -> Array:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.base import unit
 from ridgefeature.merge import along
 from ridgefeature.section import Section
+from ridgefeature.stations import unit
 
 if TYPE_CHECKING:
     from ridgefeature.ridge import Ridge

@@ -12,11 +12,11 @@ from ridgefeature.bspline import Curve
 from ridgefeature.grid import Grid
 from ridgefeature.joint import MOST_POINTS, SOME_POINTS, Joint, fit_whole
 from ridgefeature.kernels.strip import A, C, E, H, W
-from ridgefeature.path_frame import PathFrame, path_frame, unit
+from ridgefeature.path_frame import PathFrame, path_frame
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.smoothing import basis_at
-from ridgefeature.stations import Stations, arc_lengths, border_of, interpolating_curve, meeting
+from ridgefeature.stations import Stations, arc_lengths, border_of, interpolating_curve, meeting, unit
 from ridgefeature.whole_ends import BEYOND, end_interval, ends_of
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.base import Base, unit
+from ridgefeature.base import Base
 from ridgefeature.basis import basis_matrix, greville
 from ridgefeature.bspline import Surface
 from ridgefeature.merge import (
@@ -22,7 +22,7 @@ from ridgefeature.merge import (
     section_knots,
 )
 from ridgefeature.section import Section
-from ridgefeature.stations import Stations
+from ridgefeature.stations import Stations, unit
 
 Array = NDArray[np.float64]
 

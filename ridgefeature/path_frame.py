@@ -11,7 +11,7 @@ from ridgefeature.grid import Grid
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.kernels.path_points import boxes_around, count_along, rectified_along
 from ridgefeature.merge import along
-from ridgefeature.stations import Stations
+from ridgefeature.stations import Stations, unit
 
 Array = NDArray[np.float64]
 
@@ -157,8 +157,3 @@ def _corners(path: PathFrame, reach: Array) -> Array:
     left, normal = path.left[:, None], path.normal[:, None]
     aside, over = sides * (1.0 - up * bend), up + 0.5 * bend * sides**2
     return np.asarray(path.origin[:, None] + aside[:, :, None] * left + over[:, :, None] * normal)
-
-
-def unit(vectors: Array) -> Array:
-    """Vectors (n, 3) at length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

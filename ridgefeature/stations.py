@@ -73,8 +73,9 @@ def arc_lengths(path: Curve, sites: Array, per_site: int = 32) -> tuple[Array, A
     return ends, np.concatenate([[0.0], np.cumsum(pieces)])
 
 
-def _unit(vectors: Array) -> Array:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) at length 1."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), dtype=np.float64)
 
 
 def _on_path(template: Template, x: float) -> Array:
@@ -104,9 +105,9 @@ def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = 
     k = int(np.clip(_PER_TEMPLATE * len(templates) + 1, 13, _MOST))
     s = np.linspace(0.0, way.total, k)
     t = np.interp(s, way.lengths, way.fine)
-    tangent = _unit(way.path(t, 1))
+    tangent = unit(way.path(t, 1))
     normal = way.normals(templates, s)
-    normal = _unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
     found = Stations(
         arc_length=s,
         spine=way.path(t),

@@ -72,14 +72,9 @@ def rectified(
             px, py, pz = _from_path(x, y, z, origin, tangent, j, u, step)
             side = _on_mean(px, py, pz, left, j, u)
             over = _on_mean(px, py, pz, normal, j, u)
-            bend = v * curvature[j] + u * curvature[j + 1]
-            if abs(bend) * (abs(side) + abs(over)) > 1e-9:
-                # Unrolled: the base is an arc of a circle, heights are along its radii.
-                room = 1.0 - bend * over
-                if room <= 0.2:
-                    continue
-                radius = math.sqrt(bend * bend * side * side + room * room)
-                side, over = math.atan2(bend * side, room) / bend, (1.0 - radius) / bend
+            side, over, seen = _unrolled(side, over, v * curvature[j] + u * curvature[j + 1])
+            if not seen:
+                continue
             far = v * reach[j] + u * reach[j + 1]
             if abs(side) > far or abs(over) > v * tall[j] + u * tall[j + 1]:
                 continue
@@ -89,6 +84,18 @@ def rectified(
         if best >= 0.0:
             m += 1
     return out[:m]
+
+
+@njit(**INNER)
+def _unrolled(side: float, over: float, bend: float) -> tuple[float, float, bool]:
+    """Arc length and height over a base that is an arc of a circle; heights are along its radii."""
+    if abs(bend) * (abs(side) + abs(over)) <= 1e-9:
+        return side, over, True
+    room = 1.0 - bend * over
+    if room <= 0.2:
+        return side, over, False
+    radius = math.sqrt(bend * bend * side * side + room * room)
+    return math.atan2(bend * side, room) / bend, (1.0 - radius) / bend, True
 
 
 @njit(**INNER)

@@ -5,31 +5,7 @@ from numba import njit
 
 from .algebra import copy_into
 from .grid import LIMIT, Cells, Floats, Ints, before, cell_index
-
-_FEW = 32
-"""Points of a cell up to which all pairs are compared to sort them."""
-
-
-@njit(cache=True)
-def _sort_rows(rows: Floats, first: int, last: int) -> None:
-    """Sort rows[first:last] by x, then y, then z, in place (Shell sort: short runs, no worst case of n^2)."""
-    gap = 1
-    while gap < (last - first) // 8:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(first + gap, last):
-            x, j = rows[i, 0], i - gap
-            if rows[j, 0] < x:
-                continue
-            y, z = rows[i, 1], rows[i, 2]
-            while j >= first and (
-                rows[j, 0] > x
-                or (rows[j, 0] == x and (rows[j, 1] > y or (rows[j, 1] == y and rows[j, 2] > z)))
-            ):
-                rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = rows[j, 0], rows[j, 1], rows[j, 2]
-                j -= gap
-            rows[j + gap, 0], rows[j + gap, 1], rows[j + gap, 2] = x, y, z
-        gap //= 3
+from .sorting import chosen_row, ordered, sort_rows
 
 
 @njit(cache=True)
@@ -165,7 +141,7 @@ def box_points(
                     block = first // every - 1
                 while chosen < first:
                     block += 1
-                    chosen = _chosen(block, every)
+                    chosen = chosen_row(block, every)
                 if chosen >= last:
                     continue
             k = 0
@@ -176,7 +152,7 @@ def box_points(
                 pz = dx * zx + dy * zy + dz * zz
                 cell[0, k], cell[1, k], cell[2, k] = px, py, pz
                 k += abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz
-            _ordered(cell, k, order)
+            ordered(cell, k, order)
             if every == 1:
                 for j in range(k):
                     out[m, 0], out[m, 1], out[m, 2] = cell[0, order[j]], cell[1, order[j]], cell[2, order[j]]
@@ -187,44 +163,8 @@ def box_points(
                 out[m, 0], out[m, 1], out[m, 2] = cell[0, j], cell[1, j], cell[2, j]
                 m += 1
                 block += 1
-                chosen = _chosen(block, every)
+                chosen = chosen_row(block, every)
     return out, m
-
-
-@njit(cache=True)
-def _chosen(block: int, every: int) -> int:
-    """The row that is chosen of a block of so many; its place in the block goes by the golden ratio.
-
-    Multiples of that are spread evenly, and points of a regular scan are not chosen in stripes.
-    """
-    return block * every + (((block * 2654435769) & 0xFFFFFFFF) * every >> 32)
-
-
-@njit(cache=True)
-def _ordered(cell: Floats, k: int, order: Ints) -> None:
-    """Order the first k columns of cell (3, n) by x, then y, then z: their numbers, into order."""
-    if k > _FEW:
-        rows = np.empty((k, 3))
-        for i in range(k):
-            rows[i, 0], rows[i, 1], rows[i, 2] = cell[0, i], cell[1, i], cell[2, i]
-        _sort_rows(rows, 0, k)
-        for i in range(k):
-            cell[0, i], cell[1, i], cell[2, i] = rows[i, 0], rows[i, 1], rows[i, 2]
-            order[i] = i
-        return
-    # Free of branches that cannot be foretold: faster than any sort, of so few.
-    for i in range(k):
-        x, place, same = cell[0, i], 0, 0
-        for j in range(k):
-            place += cell[0, j] < x
-            same += cell[0, j] == x
-        if same > 1:
-            for j in range(k):
-                if cell[0, j] == x and j != i:
-                    alike = cell[1, j] == cell[1, i]
-                    less = cell[1, j] < cell[1, i] or (alike and cell[2, j] < cell[2, i])
-                    place += less or (alike and cell[2, j] == cell[2, i] and j < i)
-        order[place] = i
 
 
 @njit(cache=True)
@@ -343,7 +283,7 @@ def ball_points(
                         )
                         copy_into(out[m], points[j])
                         m += dx * dx + dy * dy + dz * dz <= radius * radius
-                    _sort_rows(out, run, m)
+                    sort_rows(out, run, m)
         if fill == 0:
             out = np.empty((total, 3))
     return out, m
