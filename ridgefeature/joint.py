@@ -120,8 +120,8 @@ def fit_whole(
         if last or state is None:
             break
         if shaping:
-            new = state.given(*shaped(some, state.terms, state.section, state.noise, state.inflation))
-            shaping, state = new.section is not state.section, new
+            new = _reshaped(task, state)
+            shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
     return None if state is None else _joint(points, some, path, state)
@@ -193,9 +193,18 @@ def _likeliest(task: _Task, state: _State) -> _State | None:
     return kept
 
 
+def _reshaped(task: _Task, state: _State) -> _State:
+    """With a free section if it is better; on steep flanks only if the exact likelihood says so too."""
+    new = state.given(*shaped(task.some, state.terms, state.section, state.noise, state.inflation))
+    if new.section is state.section or task.height < _STEEP * task.width:
+        return new
+    return new if _chance(task.some, new) > _chance(task.some, state) else state
+
+
 def _chance(points: Array, state: _State) -> float:
-    """Log likelihood of the points' heights."""
+    """Log likelihood of the heights of points."""
     noise = state.noise
+    points = points[:: 1 + len(points) // _TELLING]
     told = noise.blur, noise.even, noise.strays, noise.span
     return log_likelihood(points, state.terms, state.section, *told)
 
