@@ -13,7 +13,7 @@ from ridgefeature.basis import basis_matrix
 from ridgefeature.kernels.section_sums import cell_sums, spline_sums
 from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.one_hump import one_hump, symmetric_hump
-from ridgefeature.section import Section
+from ridgefeature.section import Section, box
 from ridgefeature.smearing import Smeared
 
 Array = NDArray[np.float64]
@@ -30,6 +30,8 @@ _FOOT_STD = 0.04
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
 _FOOT_BLUR = 2.0
 """Of the same, in deviations of the noise that smears it."""
+_HALF_BLUR = 0.2
+"""What that adds to the width at half height: how noise and points lie there is not known well."""
 _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
@@ -128,7 +130,7 @@ def section_std(
 ) -> SectionStd:
     """How sure a learned section is; arguments as for `free_section`. Zeros for one that has a name."""
     section = seen.section
-    if section.name not in (LEARNED, FREE):
+    if section.name not in (LEARNED, FREE, box().name):
         return SectionStd()
     spans = section.spans
     matrix, right = _sums(points, terms, seen, noise, spans, 1.0)
@@ -151,7 +153,9 @@ def section_std(
 
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     half = std(high - low)
-    foot = math.hypot(_FOOT_STD, _FOOT_BLUR * float(np.median(seen.blur)))
+    blur = float(np.median(seen.blur))
+    half = math.hypot(half, _HALF_BLUR * blur)
+    foot = math.hypot(_FOOT_STD, _FOOT_BLUR * blur)
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
 

@@ -46,6 +46,8 @@ _STEEP = 0.4
 """Height by width from which on it matters how a fit begins."""
 _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
+_MORE_ROUNDS, _STAYS = (3, 2, 1, 0, 0), 2e-3
+"""Rounds, by how much more noise is taken for that of the points; change of widths that is none."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -124,6 +126,7 @@ def fit_whole(
             shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
+    state = _settled(task, points, state)
     return None if state is None else _joint(points, some, path, state)
 
 
@@ -199,6 +202,20 @@ def _reshaped(task: _Task, state: _State) -> _State:
     if new.section is state.section or task.height < _STEEP * task.width:
         return new
     return new if _chance(task.some, new) > _chance(task.some, state) else state
+
+
+def _settled(task: _Task, points: Array, state: _State | None) -> _State | None:
+    """On steep flanks, fitted on until the widths stay: where they are a little off most of a flank is far
+    off, and passes for strays."""
+    if state is None or task.height < _STEEP * task.width:
+        return state
+    for left in _MORE_ROUNDS:
+        before, state = state, _improved(task, points, state, left)
+        if state is None:
+            return None
+        if float(np.median(np.abs(state.terms[:, W] / before.terms[:, W] - 1.0))) < _STAYS:
+            break
+    return state
 
 
 def _chance(points: Array, state: _State) -> float:
