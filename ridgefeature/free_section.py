@@ -255,8 +255,4 @@ def _feet(section: Section) -> tuple[float, float]:
     ratios = (_ROOTS[:, 2] - _ROOTS[:, 1]) / (_ROOTS[:, 1] - _ROOTS[:, 0])
     outer, _, inner = _ROOTS[np.argmin(np.abs(ratios - found))]
     reach = (sides[:, 0] + (sides[:, 0] - sides[:, 2]) * outer / (inner - outer)) * (eta[1] - eta[0])
-    low, high = float(eta[top] - reach[1]), float(eta[top] + reach[0])
-    # One that does not come down tells of no foot: there the old one stays.
-    tails = section(np.array([-0.5, 0.5]) * (1.0 - 6.0 / section.spans)) > _LOW[0] * f[top]
-    near = 0.5 / WIDER
-    return max(low, -near if tails[0] else -0.5), min(high, near if tails[1] else 0.5)
+    return max(float(eta[top] - reach[1]), -0.5), min(float(eta[top] + reach[0]), 0.5)

@@ -11,8 +11,6 @@ from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.kernels.strip import (
     TERMS,
-    A,
-    B,
     C,
     E,
     H,
@@ -22,7 +20,7 @@ from ridgefeature.kernels.strip import (
     offsets,
 )
 from ridgefeature.noise import EXACT, Noise, blur_of, first_noise, inflation_of
-from ridgefeature.path_frame import PathFrame, points_along
+from ridgefeature.path_frame import PathFrame, points_along, wanted_differences
 from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, with_half_height_width
@@ -46,8 +44,6 @@ _STEEP = 0.4
 """Height by width from which on it matters how a fit begins."""
 _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
-_MORE_ROUNDS, _STAYS = (3, 2, 1, 0, 0), 2e-3
-"""Rounds, by how much more noise is taken for that of the points; change of widths that is none."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -126,7 +122,6 @@ def fit_whole(
             shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
-    state = _settled(task, points, state)
     return None if state is None else _joint(points, some, path, state)
 
 
@@ -162,7 +157,8 @@ class _Task:
 def _task(some: Array, path: PathFrame, flat: bool) -> _Task:
     known = np.abs(path.height[path.height != 0])
     width = float(np.median(path.width))
-    return _Task(some, path, flat, _wanted(path), float(np.median(known)) if len(known) else width, width)
+    height = float(np.median(known)) if len(known) else width
+    return _Task(some, path, flat, wanted_differences(path), height, width)
 
 
 def _begun(task: _Task, section: Section, before: Joint | None) -> _State:
@@ -202,20 +198,6 @@ def _reshaped(task: _Task, state: _State) -> _State:
     if new.section is state.section or task.height < _STEEP * task.width:
         return new
     return new if _chance(task.some, new) > _chance(task.some, state) else state
-
-
-def _settled(task: _Task, points: Array, state: _State | None) -> _State | None:
-    """On steep flanks, fitted on until the widths stay: where they are a little off most of a flank is far
-    off, and passes for strays."""
-    if state is None or task.height < _STEEP * task.width:
-        return state
-    for left in _MORE_ROUNDS:
-        before, state = state, _improved(task, points, state, left)
-        if state is None:
-            return None
-        if float(np.median(np.abs(state.terms[:, W] / before.terms[:, W] - 1.0))) < _STAYS:
-            break
-    return state
 
 
 def _chance(points: Array, state: _State) -> float:
@@ -289,25 +271,3 @@ def _fix(matrix: Array, goal: Array, term: int) -> None:
     """Let normal equations ask for 0 of one term, whatever the others are."""
     goal[:, term] = matrix[:, term] = matrix[:, :, term] = 0.0
     matrix[:, term, term] = 1.0
-
-
-def _wanted(path: PathFrame) -> Array:
-    """(6, n) what the differences of the coefficients should be for path and base to be smooth as a whole."""
-    n, s = path.coefficients, path.at
-    out = np.zeros((TERMS, n))
-
-    def rate(x: Array) -> Array:
-        return np.asarray(np.gradient(x, s, axis=0))
-
-    turn = rate(path.tangent)
-    bow = rate((turn * path.normal).sum(axis=1))
-    geodesic = rate((turn * path.left).sum(axis=1))
-    twist = rate(-(rate(path.normal) * path.left).sum(axis=1))
-    step = np.gradient(s, path.knots)
-    for term, order, change in ((A, 3, bow), (E, 3, geodesic), (B, 2, twist)):
-        # The middle of the coefficients of a difference; the i-th is centred i - 1 knots from the start.
-        places = np.clip(np.arange(n - order) + 0.5 * order - 1.0, 0.0, n - 3.0)
-        out[term, : n - order] = -np.interp(places, path.knots, change * step**order)
-    centres = np.clip(np.arange(n) - 1.0, 0.0, n - 3.0)
-    out[C, : n - 1] = -np.diff(0.5 * np.interp(centres, path.knots, path.curvature))
-    return out

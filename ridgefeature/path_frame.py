@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ridgefeature.grid import Grid
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.kernels.path_points import boxes_around, count_along, rectified_along
+from ridgefeature.kernels.strip import TERMS, A, B, C, E
 from ridgefeature.merge import along
 from ridgefeature.stations import Stations, unit
 
@@ -157,3 +158,25 @@ def _corners(path: PathFrame, reach: Array) -> Array:
     left, normal = path.left[:, None], path.normal[:, None]
     aside, over = sides * (1.0 - up * bend), up + 0.5 * bend * sides**2
     return np.asarray(path.origin[:, None] + aside[:, :, None] * left + over[:, :, None] * normal)
+
+
+def wanted_differences(path: PathFrame) -> Array:
+    """(6, n) what the differences of the coefficients should be for path and base to be smooth as a whole."""
+    n, s = path.coefficients, path.at
+    out = np.zeros((TERMS, n))
+
+    def rate(x: Array) -> Array:
+        return np.asarray(np.gradient(x, s, axis=0))
+
+    turn = rate(path.tangent)
+    bow = rate((turn * path.normal).sum(axis=1))
+    geodesic = rate((turn * path.left).sum(axis=1))
+    twist = rate(-(rate(path.normal) * path.left).sum(axis=1))
+    step = np.gradient(s, path.knots)
+    for term, order, change in ((A, 3, bow), (E, 3, geodesic), (B, 2, twist)):
+        # The middle of the coefficients of a difference; the i-th is centred i - 1 knots from the start.
+        places = np.clip(np.arange(n - order) + 0.5 * order - 1.0, 0.0, n - 3.0)
+        out[term, : n - order] = -np.interp(places, path.knots, change * step**order)
+    centres = np.clip(np.arange(n) - 1.0, 0.0, n - 3.0)
+    out[C, : n - 1] = -np.diff(0.5 * np.interp(centres, path.knots, path.curvature))
+    return out

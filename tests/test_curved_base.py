@@ -340,7 +340,7 @@ def test_height_and_width_are_those_of_the_ridge_whatever_the_base(name, rate):
 
 
 def test_errors_are_as_large_as_their_standard_deviations():
-    pulls = [errors(registered("sphere", 5, seed))[2:] for seed in range(10)]
+    pulls = [errors(registered("sphere", 5, seed))[2:] for seed in range(20)]
     for values in zip(*pulls, strict=True):
         assert 0.75 < np.sqrt(np.mean(np.concatenate(values) ** 2)) < 1.3
 
