@@ -122,7 +122,16 @@ def fit_whole(
             shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
-    return None if state is None else _joint(points, some, path, state)
+    return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """What a round of the fit found, and the normal equations that it solved."""
+
+    smooth: Smooth
+    matrix: Array
+    goal: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +143,8 @@ class _State:
     noise: Noise
     weights: Array
     inflation: float = 1.0
-    smooth: Smooth | None = None
-    matrix: Array | None = None
-    goal: Array | None = None
+    fit: _Fit | None = None
+    """None before the first round."""
 
     def given(self, section: Section, terms: Array) -> _State:
         return replace(self, section=section, terms=terms)
@@ -219,7 +227,7 @@ def _improved(task: _Task, points: Array, state: _State | None, left: int) -> _S
     matrix, goal, noise, gain = _linearised(points, task.some, state, EXACT * 2.0**left * task.height)
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
-    inflation = inflation_of(gain * matrix, gain * goal) if state.smooth is not None else state.inflation
+    inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
     matrix, goal = gain / inflation * matrix, gain / inflation * goal
     if task.flat:
@@ -231,19 +239,18 @@ def _improved(task: _Task, points: Array, state: _State | None, left: int) -> _S
     if not np.isfinite(terms).all():
         return None
     terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-    return _State(terms, state.section, noise, smooth.weights, inflation, smooth, matrix, goal)
+    return _State(terms, state.section, noise, smooth.weights, inflation, _Fit(smooth, matrix, goal))
 
 
-def _joint(points: Array, some: Array, path: PathFrame, state: _State) -> Joint:
+def _joint(points: Array, some: Array, path: PathFrame, state: _State, fit: _Fit) -> Joint:
     stretches = len(path.at) - 1
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches].astype(float)
     terms, noise, inflation = state.terms, state.noise, state.inflation
     seen = smear(state.section, terms, noise.blur, noise.even)
     shape = section_std(some, terms, seen, noise.told, inflation)
     misfit = _misfit(some, terms, seen, noise.scale)
-    smooth, matrix, goal = state.smooth, state.matrix, state.goal
-    assert smooth is not None and matrix is not None and goal is not None
-    return Joint(path, smooth, terms, state.section, matrix, goal, counts, misfit, noise, inflation, shape)
+    told = fit.smooth, terms, state.section, fit.matrix, fit.goal
+    return Joint(path, *told, counts, misfit, noise, inflation, shape)
 
 
 def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:
