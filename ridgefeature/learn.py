@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.improve import limits_of, loss_of, refine
+from ridgefeature.improve import improve, limits_of, loss_of, refine, sample, sized
 from ridgefeature.kernels import appraise
+from ridgefeature.kernels.appraise import residuals
 from ridgefeature.kernels.base import flattened, on_base
-from ridgefeature.section import REACH, SECTIONS, Section, bell, uniform_basis
+from ridgefeature.section import REACH, SECTIONS, Section, bell, plateau, uniform_basis
 from ridgefeature.settings import Settings
 from ridgefeature.settle import misfit_scale
 from ridgefeature.template import Template
@@ -20,6 +21,14 @@ _MOST = 2000
 _PROBES = 6
 _SMALLEST_SHIFT = 0.01
 _MUCH_BETTER = 0.8
+_STEEP = 0.4
+"""Height of a bell, in its widths, from which on the march may do better with another section."""
+_LEAST_CONTRAST = 0.02
+"""Least noise scale, in parts of the height, by which the first template's section is judged."""
+_DOUBT = 6.0
+"""Log likelihood ratio from which on the march takes another section."""
+_CLEARLY = 0.98
+"""Distance of patch and points, in parts of the bell's, from which on it does so too."""
 _NARROWER = (1.0, 0.9, 0.8, 0.7)
 """Widths tried for a learned section, in widths of the section before it."""
 
@@ -27,6 +36,30 @@ _NARROWER = (1.0, 0.9, 0.8, 0.7)
 def first_section(settings: Settings) -> Section:
     """The section to march with."""
     return SECTIONS.get(settings.section, bell)()
+
+
+def march_section(window: Window, first: Template, settings: Settings) -> Template:
+    """The first template, on steep flanks with a steeper section if that is likelier or nearer to its points.
+
+    Distances count both ways: a bell on steep flanks comes out too wide, or as a spike whose top no point is
+    near to.
+    """
+    if settings.section != "auto" or settings.measure == "M" or abs(first.height) < _STEEP * first.width:
+        return first
+    points = window(first)
+    steep = improve(window, with_section(first, plateau()), settings)
+    if steep.status in ("failed", "no data") or not steep.height * first.height > 0:
+        return first
+    scale = max(min(first.scale, steep.scale), _LEAST_CONTRAST * abs(first.height))
+    apart, losses = [], []
+    for template in (first, steep):
+        seen = _seen_from(template, points, first)
+        losses.append(len(seen) * appraise.mean_loss(seen, *template.shape, scale, *loss_of(settings))[0])
+        forth = np.median(np.abs(residuals(seen, *template.shape)))
+        apart.append(float(forth) + window.mean_distance(sample(template), 1))
+    if losses[1] > losses[0] - _DOUBT and apart[1] > _CLEARLY * apart[0]:
+        return first
+    return improve(window, sized(steep, settings), settings)
 
 
 def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:

@@ -14,7 +14,7 @@ from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, neare
 from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
 from ridgefeature.joint_stations import refitted
-from ridgefeature.learn import choose_section, first_section, in_doubt, with_section
+from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, with_section
 from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.rings import ring_or_not
@@ -117,7 +117,7 @@ def _track(
             f"needed {settings.evidence:g}); pick a point on the ridge, or give direction=, width= and "
             "height= as a start"
         )
-    first = _canonical(full, first, pick, hints)
+    first = _canonical(full, march_section(rough, first, settings), pick, hints)
     track = ring_or_not(full, march(rough, full, first, settings, progress), settings)
     track = place_ends(full, track, settings)
     track = settle_base(full, settle(full, track, settings), settings)
