@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.grid import Grid
-from ridgefeature.joint import MOST_POINTS, SOME_POINTS, Joint, fit_whole
+from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
+from ridgefeature.joint_rounds import is_steep
 from ridgefeature.kernels.strip import A, C, E, H, W
 from ridgefeature.path_frame import PathFrame, path_frame
 from ridgefeature.section import Section
@@ -54,6 +55,7 @@ def refitted(
     open_ends: which ends may move, further out or back.
     """
     flat = settings.flat
+    stations, section = _upright(grid, stations, section, closed, settings, flat)
     first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:
         return Refit(stations)
@@ -67,6 +69,21 @@ def refitted(
     if joint is None:
         return Refit(laid, first, intervals)
     return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals)
+
+
+def _upright(
+    grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
+) -> tuple[Stations, Section]:
+    """Stations and section of a steep ridge as its fit begins: high flanks lean where the base is wrong."""
+    path = path_frame(stations, closed)
+    if not is_steep(path) or settings.section not in FOUND:
+        return stations, section
+    begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
+    if begun is None or not _sound(begun):
+        return stations, section
+    if not stations.curvature.any() and begun.bent < _BENT:
+        begun = begun.without(C)
+    return stations_of(begun, len(stations.arc_length), settings), begun.section
 
 
 def _fit(
