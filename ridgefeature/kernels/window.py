@@ -275,9 +275,8 @@ def ball_points(
     for a in range(3):
         reach = radius * (1.0 + 1e-14) + 1e-15 * abs(centre[a])
         spans[a, 0], spans[a, 1] = _span(levels, frame, a, centre[a] - reach, centre[a] + reach)
-    total = 0
+    total, m = 0, 0
     out = np.empty((0, 3))
-    m = 0
     for fill in range(2):
         for z in range(spans[2, 0], spans[2, 1] + 1):
             for y in range(spans[1, 0], spans[1, 1] + 1):
