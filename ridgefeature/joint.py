@@ -21,7 +21,7 @@ from ridgefeature.kernels.strip import (
 )
 from ridgefeature.noise import EXACT, Noise, blur_of, first_noise, inflation_of
 from ridgefeature.path_frame import PathFrame, points_along, wanted_differences
-from ridgefeature.section import Section, box
+from ridgefeature.section import SECTIONS, Section, box, plateau
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, with_half_height_width
 from ridgefeature.smearing import Smeared, log_likelihood, smear
@@ -173,14 +173,17 @@ def _begun(task: _Task, section: Section, before: Joint | None) -> _State:
 
 def _likeliest(task: _Task, state: _State) -> _State | None:
     """The likeliest of what a steep ridge may be, after some rounds: with the section that it has or with a
-    box, and with points that lie evenly over the base or over the surface."""
+    box, and with points that lie evenly over the base or over the surface.
+
+    In place of a learned section a plateau: one that was learned on steep flanks misses as templates do.
+    """
     h, w = task.height, task.width
     if h < _STEEP * w:
         return state
     points = task.some[:: 1 + len(task.some) // _TELLING]
     task = replace(task, some=points)
     best, kept = -np.inf, None
-    for section in (state.section, box()):
+    for section in (state.section if state.section.name in SECTIONS else plateau(), box()):
         terms = with_half_height_width(state.terms, state.section, section)
         for even in (0.0, 1.0):
             noise = first_noise(points, terms, section, h, w, even)
