@@ -27,6 +27,8 @@ _NARROWEST, _LOWEST = 0.2, 0.02
 """Least width and height, in those that are usual: neither vanishes nor changes its sign."""
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
+_GROWTHS, _MUCH = 20, 0.3
+"""How often the ends are looked for further out; by how many widths they must have moved for that."""
 _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
@@ -62,11 +64,30 @@ def refitted(
         first = first.without(C)
     laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
-        laid, intervals = _between_ends(grid, laid, first, open_ends, settings, flat)
+        laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat)
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
         return Refit(laid, first, intervals)
     return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals)
+
+
+def _grown(
+    grid: Grid, laid: Stations, joint: Joint, open_ends: tuple[bool, bool], settings: Settings, flat: bool
+) -> tuple[Stations, Array | None, Joint]:
+    """Stations between the ends, these ends' intervals, and the fit that told them.
+
+    A ridge that is seen further out than the march went may go on beyond what was looked at.
+    """
+    for _ in range(_GROWTHS):
+        before = float(laid.arc_length[-1])
+        laid, intervals = _between_ends(grid, laid, joint, open_ends, settings, flat)
+        if float(laid.arc_length[-1]) < before + _MUCH * float(np.median(laid.width)):
+            break
+        again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
+        if again is None:
+            break
+        joint, laid = again, stations_of(again, len(laid.arc_length), settings)
+    return laid, intervals, joint
 
 
 def _fit(
@@ -94,7 +115,7 @@ def _between_ends(
     wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None
-    start, end = ends_of(wide, 0.0, length, open_ends)
+    start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead)
     if end - start < _SHORTEST * float(np.median(stations.width)):
         return stations, None
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start
