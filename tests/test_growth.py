@@ -45,3 +45,22 @@ def test_over_a_gap_wider_than_it_may_look_ahead_it_does_not():
     assert 7.0 < ridge.stations.spine[:, 0].max() < 8.9
     ridge = whole(points, known(*np.arange(-30.0, 1.0, 6.4)), rf.Settings(look_ahead=2.5))
     assert 39.0 < ridge.stations.spine[:, 0].max() < 40.9
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_of_a_march_astray_what_is_alike_is_left(side):
+    """It left the ridge for the flat ground beside it, where it saw a higher one."""
+    points, _ = straight_ridge(24000, noise=0.05, half=(40, 30))
+    on = known(*np.arange(-36.0, 1.0, 6.4))
+    last = on[-1].position
+    astray = [
+        template_at(
+            position=(last[0] + 3 * i, side * 5.4 * i, 0), height=9.0, turn=(0, 0, side * 1.1), std=on[0].std
+        )
+        for i in range(1, 6)
+    ]
+    ridge = whole(points, [*on, *astray])
+    assert ridge.joint is not None
+    assert np.abs(ridge.stations.spine[:, 1]).max() < 0.5
+    assert np.abs(ridge.stations.height - 3.0).max() < 0.3
+    assert ridge.stations.arc_length[-1] > 30.0
