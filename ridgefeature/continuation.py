@@ -32,6 +32,9 @@ _BEYOND_EVIDENCE = 0.3
 _USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
+_FEWER, _SPARSE = 0.75, 0.35
+"""Points of a template, in usual ones, below which their density is looked at; density of strays alone, in
+that of the last ones."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -89,6 +92,21 @@ def outgrown(fitted: Template, chain: list[Template]) -> str:
     """Why a template is no part of a ridge as the last ones show it: another, wider rise under it."""
     usual = statistics.median(t.width for t in chain[-_USUAL:])
     return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
+
+
+def sparse(full: Window, fitted: Template, chain: list[Template]) -> str:
+    """Why a template lies on strays alone: beyond the border of the data there are far fewer points."""
+    known = [t for t in chain if t.evidence > 0.0][-_USUAL:]
+    if not known or fitted.points >= _FEWER * statistics.median(t.points for t in known):
+        return ""
+    # The least of the last five: a scan is not everywhere as dense.
+    least = min(_density(full, t) for t in known)
+    return "the data end here" if _density(full, fitted) < _SPARSE * least else ""
+
+
+def _density(full: Window, template: Template) -> float:
+    """Points by area of a template's window."""
+    return len(full(template)) / (2.0 * template.half_breadth * template.length)
 
 
 def met(template: Template, others: list[Template]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ _NARROWEST, _LOWEST = 0.2, 0.02
 """Least width and height, in those that are usual: neither vanishes nor changes its sign."""
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
+_GROWTHS, _MUCH = 20, 0.3
+"""How often the ends are looked for further out; by how many widths they must have moved for that."""
+_ALIKE = 0.75
+"""Least height and width of the same ridge, in those that are usual; the largest are its reciprocal."""
 _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
@@ -52,23 +56,81 @@ def refitted(
 ) -> Refit:
     """The stations fitted again as a whole; as they were where there are too few points.
 
-    open_ends: which ends may move, further out or back.
+    open_ends: which ends may move, further out or back. Where no sound fit goes along all stations, the march
+    went astray: then along those that are alike.
     """
+    found, sound = _refitted(grid, stations, section, closed, open_ends, settings)
+    core = None if sound or closed else _core(stations)
+    if core is None:
+        return found
+    again, sound = _refitted(grid, core, section, closed, (True, True), settings)
+    return again if sound else found
+
+
+def _refitted(
+    grid: Grid,
+    stations: Stations,
+    section: Section,
+    closed: bool,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+) -> tuple[Refit, bool]:
+    """The same of all these stations, and whether it is sound to the end."""
     flat = settings.flat
     stations, section = _upright(grid, stations, section, closed, settings, flat)
     first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:
-        return Refit(stations)
+        return Refit(stations), False
     if not stations.curvature.any() and first.bent < _BENT:
         flat = True
         first = first.without(C)
     laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
-        laid, intervals = _between_ends(grid, laid, first, open_ends, settings, flat)
+        laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat)
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
-        return Refit(laid, first, intervals)
-    return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals)
+        return Refit(laid, first, intervals), False
+    return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals), True
+
+
+def _core(stations: Stations) -> Stations | None:
+    """The longest stretch whose height and width are near the usual: what is left of a march astray.
+
+    Without half a width at either end, which what follows may have bent. None where that is too short, or all
+    of it.
+    """
+    height, width = (v / np.median(v) for v in (stations.height, stations.width))
+    alike = (height > _ALIKE) & (height < 1 / _ALIKE) & (width > _ALIKE) & (width < 1 / _ALIKE)
+    if alike.all() or not alike.any():
+        return None
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]]))).reshape(-1, 2)
+    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
+    s, usual = stations.arc_length, float(np.median(stations.width))
+    low, high = s[first] + 0.5 * usual * (first > 0), s[last - 1] - 0.5 * usual * (last < len(s))
+    if high - low < _SHORTEST * usual:
+        return None
+    kept = (s >= low) & (s <= high)
+    parts = {f.name: getattr(stations, f.name)[kept] for f in fields(Stations)}
+    return Stations(**{**parts, "arc_length": s[kept] - s[kept][0]})
+
+
+def _grown(
+    grid: Grid, laid: Stations, joint: Joint, open_ends: tuple[bool, bool], settings: Settings, flat: bool
+) -> tuple[Stations, Array | None, Joint]:
+    """Stations between the ends, these ends' intervals, and the fit that told them.
+
+    A ridge that is seen further out than the march went may go on beyond what was looked at.
+    """
+    for _ in range(_GROWTHS):
+        before = float(laid.arc_length[-1])
+        laid, intervals = _between_ends(grid, laid, joint, open_ends, settings, flat)
+        if float(laid.arc_length[-1]) < before + _MUCH * float(np.median(laid.width)):
+            break
+        again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
+        if again is None:
+            break
+        joint, laid = again, stations_of(again, len(laid.arc_length), settings)
+    return laid, intervals, joint
 
 
 def _upright(
@@ -111,7 +173,7 @@ def _between_ends(
     wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None
-    start, end = ends_of(wide, 0.0, length, open_ends)
+    start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead)
     if end - start < _SHORTEST * float(np.median(stations.width)):
         return stations, None
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start

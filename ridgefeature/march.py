@@ -10,7 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.continuation import FLAT, across, append, met, misfits, outgrown, reject, round_corner
+from ridgefeature.continuation import (
+    FLAT,
+    across,
+    append,
+    met,
+    misfits,
+    outgrown,
+    reject,
+    round_corner,
+    sparse,
+)
 from ridgefeature.curvature import Ahead, Found
 from ridgefeature.improve import improve, start_loss
 from ridgefeature.neighbours import comes_home
@@ -110,7 +120,7 @@ def _fit_best(
         if best is not None and i >= len(starts) and best[1].evidence < _HOPELESS:
             break
         fitted = improve(window, start, settings)
-        why = reject(fitted, start, settings, gap) or outgrown(fitted, chain)
+        why = reject(fitted, start, settings, gap) or outgrown(fitted, chain) or sparse(full, fitted, chain)
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
         if fitted.status == "no data" or (not why and fitted.scale < suspect):

@@ -6,6 +6,8 @@ or nothing but strays is left, it is cut.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,14 +28,19 @@ _DENSE = 0.5
 """Points a stretch, in parts of what is usual, below which the data end."""
 _NEAR = 0.3
 """Length in widths of the stretch whose points are counted."""
-_RISES = 1.3
-"""Height further out, in parts of that at the end, above which it is something else."""
+_FALLS, _RISES = 0.08, 1.3
+"""Heights further out, in parts of that at the end, below which it ended there, whatever the base's misfit
+shows, and above which it is something else."""
+_STEP = 0.7
+"""Widths by which windows are followed further out at once: further on the path may bend."""
 _SEEN = 0.6
 """Part of the last window in which a ridge is seen that still belongs to it."""
 _BEFORE = (1.5, 0.4)
 """Stretch before an end, in widths, whose heights tell how high the ridge would be further on."""
 _LIKELY = 6.0
 """Twice the log likelihood ratio up to which a place may be the end: of a change point, at 95 %."""
+_NEARLY = 0.3
+"""Widths by which a known end may lie too far out."""
 _ANYTHING = 3.84
 _MISFIT = 2.5
 """Mean squared distance of points, in that usual, above which a stretch may be something else."""
@@ -81,39 +88,47 @@ def _windows(values: Array, count: int) -> Array:
     return np.asarray(total[count:] - total[:-count])
 
 
-def ends_of(joint: Joint, start: float, end: float, open_ends: tuple[bool, bool]) -> tuple[float, float]:
+def ends_of(
+    joint: Joint, start: float, end: float, open_ends: tuple[bool, bool], ahead: float
+) -> tuple[float, float]:
     """Arc lengths of the joint's path between which the ridge is, known so far from start to end.
 
-    The joint was fitted further out. open_ends: which of both may move.
+    The joint was fitted further out. open_ends: which of both may move. ahead: widths
+    without data over which a ridge is followed.
     """
+    if open_ends[1]:
+        end = _end_of(joint, start, end, ahead)
+    if open_ends[0]:
+        start = -_end_of(_backwards(joint), -end, -start, ahead)
+    return start, end
+
+
+def _backwards(joint: Joint) -> Joint:
+    """The same stretches in the other order, for what is told of the last end of a ridge."""
+    path = joint.path
+    path = replace(path, at=-path.at[::-1], height=path.height[::-1], width=path.width[::-1])
+    turned = {name: getattr(joint, name)[::-1] for name in ("terms", "matrix", "goal", "counts", "misfit")}
+    return replace(joint, path=path, **turned)
+
+
+def _end_of(joint: Joint, start: float, end: float, ahead: float) -> float:
+    """Where a ridge ends whose last end is known to be near `end`."""
     path = joint.path
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
+    inside = (path.at >= start) & (path.at <= end)
+    low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
+    count = _windows(joint.counts, near) / _windows(path.width[1:] ** 2, near)
+    dense = count > _DENSE * np.median(count[inside[:-near]])
     found, height = evidence(joint, one)
     half, above = evidence(joint, one // 2)
-    half = np.where(above * np.median(path.height[path.at > 0]) > 0, half, 0.0)
-    count = _windows(joint.counts, near) / _windows(path.width[1:] ** 2, near)
-    inside = (path.at >= start) & (path.at <= end)
-    dense = count > _DENSE * np.median(count[inside[:-near]])
-    low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
-    if open_ends[1]:
-        seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
-        k = _end(seen, height, dense, joint.terms[:, H], high, one, near)
-        end = end if k == high else float(path.at[k])
-    if open_ends[0]:
-        last = len(path.at) - 1
-        seen = (found > VISIBLE) & (half[: len(found)] > _OUTER)
-        k = last - _end(seen[::-1], height[::-1], dense[::-1], joint.terms[::-1, H], last - low, one, near)
-        start = start if k == low else float(path.at[k])
+    half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
+    seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
+    k = _end(seen, height, dense, joint.terms[:, H], high, one, near, ahead * one + near)
+    end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
     least = (_LEAST_NOISE * float(np.median(np.abs(path.height[inside]))) / joint.noise.scale) ** 2
-    low, high = int(np.searchsorted(path.at, start)), int(np.searchsorted(path.at, end, "right")) - 1
-    if open_ends[1]:
-        k = _same_ridge(joint.misfit, joint.terms, least, low, high)
-        end = end if k == high else float(path.at[k])
-    if open_ends[0]:
-        last = len(path.at) - 1
-        k = last - _same_ridge(joint.misfit[::-1], joint.terms[::-1], least, last - high, last - low)
-        start = start if k == low else float(path.at[k])
-    return start, end
+    high = int(np.searchsorted(path.at, end, "right")) - 1
+    k = _same_ridge(joint.misfit, joint.terms, least, low, high)
+    return end if k == high else float(path.at[k])
 
 
 def _same_ridge(misfit: Array, terms: Array, least: float, start: int, end: int) -> int:
@@ -142,51 +157,96 @@ def _same_ridge(misfit: Array, terms: Array, least: float, start: int, end: int)
     return cut
 
 
-def _end(seen: Flags, height: Array, dense: Flags, known: Array, i: int, one: int, near: int) -> int:
+def _end(
+    seen: Flags, height: Array, dense: Flags, known: Array, i: int, one: int, near: int, gap: float
+) -> int:
     """The node at which a ridge ends that is known up to the i-th: further on while it is seen, or earlier.
 
     seen, height: of windows of `one` stretches from each node on; dense: whether there are data, of windows
-    of `near` stretches; known: heights at the nodes as the whole fit has them.
+    of `near` stretches; known: heights at the nodes as the whole fit has them. gap: the most stretches
+    without data beyond which it is looked for.
     """
     usual = float(np.median(known[max(i - one, 0) : i + 1]))
-    k = i + 1
-    seen = seen & (height * usual > 0) & (np.abs(height) < _RISES * abs(usual))
-    while k < len(seen) and seen[k] and dense[k : k + one].all():
-        k += 1
-    if k > i + 1:
-        return min(k - 1 + round(_SEEN * one), len(known) - 1)
+    last, empty = i, 0
+    seen = seen & (height * usual > _FALLS * usual**2) & (height * usual < _RISES * usual**2)
+    for k in range(i + 1, len(seen)):
+        empty = 0 if dense[k] else empty + 1
+        whole = bool(dense[k : k + one].all())
+        if whole and seen[k]:
+            last = k
+        if empty > gap or (whole and not seen[k]) or last - i >= _STEP * one:
+            break
+    if last > i:
+        return min(last + round(_SEEN * one), len(known) - 1)
     while i > near and not dense[i - near]:
         i -= 1
     return i
 
 
+def _likeliest(joint: Joint, place: float, dense: Flags, near: int, known: bool) -> float:
+    """The arc length at which an end at about `place` is most likely, where there are data up to it.
+
+    known: it was told before, and stays if it may be there, or nearly: a little of the ground beyond it shows
+    how high a steep ridge stands.
+    """
+    at, gain = _told(joint, place)
+    if not len(at):
+        return place
+    last = i = int(np.argmin(np.abs(joint.path.at - place)))
+    while last + 1 < len(joint.path.at) and dense[last + 1 - near]:
+        last += 1
+    reached = at <= joint.path.at[last]
+    at, gain = at[reached], gain[reached]
+    best = float(at[np.argmax(gain)])
+    if known and gain[np.argmin(np.abs(at - joint.path.at[i]))] > gain.max() - _LIKELY:
+        return place
+    if known and 0.0 < place - best < _NEARLY * float(joint.path.width[i]):
+        return place
+    return best
+
+
+def _told(joint: Joint, place: float) -> tuple[Array, Array]:
+    """Places (k,) about an end, and twice the log likelihood that it is at each of them.
+
+    That is where the height as it is before it stops being more likely than none. Empty where that is not
+    known.
+    """
+    at = joint.path.at
+    local = float(joint.path.width[np.argmin(np.abs(at - place))])
+    from_end = (0.5 * (at[1:] + at[:-1]) - place) / local
+    known = (from_end > -_BEFORE[0]) & (from_end < -_BEFORE[1])
+    if known.sum() < 3:
+        return np.empty(0), np.empty(0)
+    terms = 0.5 * (joint.terms[1:] + joint.terms[:-1])
+    slope, level = np.polyfit(from_end[known], terms[known, H], 1)
+    sign = np.sign(np.median(terms[known, H]))
+    height = sign * np.maximum(sign * (level + slope * from_end), 0.0)
+    near = np.flatnonzero((from_end > -_BEFORE[0]) & (from_end < BEYOND))
+    gain = _gain(joint.matrix[near], joint.goal[near], terms[near], height[near])
+    return at[near[0] : near[-1] + 2], np.concatenate([[0.0], np.cumsum(gain)])
+
+
 def end_interval(joint: Joint, place: float, outwards: int) -> tuple[float, float]:
     """Arc lengths between which an end at `place` is, to about 95 %.
 
-    outwards: 1 for the end at the path's end, -1 for that at its start. The end is where the height as it is
-    before it stops being more likely than none. A ridge that has nearly faded may go on as long as the points
-    of one width show anything.
+    outwards: 1 for the end at the path's end, -1 for that at its start. A ridge that has nearly faded may go
+    on as long as the points of one width show anything.
     """
-    at, end = outwards * joint.path.at[::outwards], outwards * place
-    local = float(joint.path.width[::outwards][np.argmin(np.abs(at - end))])
-    from_end = (0.5 * (at[1:] + at[:-1]) - end) / local
+    if outwards < 0:
+        low, high = end_interval(_backwards(joint), -place, 1)
+        return -high, -low
+    at = joint.path.at
+    i = int(np.argmin(np.abs(at - place)))
+    local = float(joint.path.width[i])
     slack = _SLACK * local
-    low, high = end - slack, end + slack
-    known = (from_end > -_BEFORE[0]) & (from_end < -_BEFORE[1])
-    if known.sum() >= 3:
-        terms = joint.terms[::outwards]
-        terms = 0.5 * (terms[1:] + terms[:-1])
-        slope, level = np.polyfit(from_end[known], terms[known, H], 1)
-        sign = np.sign(np.median(terms[known, H]))
-        height = sign * np.maximum(sign * (level + slope * from_end), 0.0)
-        near = np.flatnonzero((from_end > -_BEFORE[0]) & (from_end < BEYOND))
-        gain = _gain(joint.matrix[::outwards][near], joint.goal[::outwards][near], terms[near], height[near])
-        total = np.concatenate([[0.0], np.cumsum(gain)])
-        likely = at[near[0] : near[-1] + 2][total > total.max() - _LIKELY]
-        low, high = min(likely[0], end) - slack, max(likely[-1], end) + slack
-        if abs(level) < _FADED * float(np.median(np.abs(joint.terms[:, H]))):
-            low, high = low - _FADING * local, max(high, _last_shown(joint, at, end, outwards) + slack)
-    return (low, high) if outwards > 0 else (-high, -low)
+    low, high = place - slack, place + slack
+    places, gain = _told(joint, place)
+    if len(places):
+        likely = places[gain > gain.max() - _LIKELY]
+        low, high = min(likely[0], place) - slack, max(likely[-1], place) + slack
+        if abs(joint.terms[i, H]) < _FADED * float(np.median(np.abs(joint.terms[:, H]))):
+            low, high = low - _FADING * local, max(high, _last_shown(joint, place) + slack)
+    return low, high
 
 
 def _gain(matrix: Array, goal: Array, terms: Array, height: Array) -> Array:
@@ -196,10 +256,11 @@ def _gain(matrix: Array, goal: Array, terms: Array, height: Array) -> Array:
     return np.asarray(height * (2.0 * pull - height * matrix[:, H, H]))
 
 
-def _last_shown(joint: Joint, at: Array, end: float, outwards: int) -> float:
+def _last_shown(joint: Joint, end: float) -> float:
     """The middle of the last of the windows from an end on whose points show any ridge."""
+    at = joint.path.at
     one = min(NODES_A_WIDTH, len(at) - 2)
-    shown = evidence(joint, one)[0][::outwards]
+    shown = evidence(joint, one)[0]
     k = max(int(np.searchsorted(at, end)) - one // 2, 0)
     while k < len(shown) - 1 and shown[k] > _ANYTHING:
         k += 1

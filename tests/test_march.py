@@ -6,13 +6,24 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from oracles import PICK, SPIRAL, apex, bell, spiral_points, spiral_ridge, window_on
+from oracles import (
+    PICK,
+    SPIRAL,
+    apex,
+    bell,
+    spiral_points,
+    spiral_ridge,
+    straight_ridge,
+    template_at,
+    window_on,
+)
 
 import ridgefeature as rf
 from ridgefeature.continuation import append
 from ridgefeature.guess import Hints, guess
-from ridgefeature.march import march, reverse
+from ridgefeature.march import march, march_one_way, reverse
 from ridgefeature.synthetic import Spiral
+from ridgefeature.template import Template
 
 SETTINGS = rf.Settings()
 
@@ -252,3 +263,14 @@ def test_an_interrupt_keeps_what_is_there_and_says_so(calls):
     assert np.isfinite(found.surface().poles).all()
     s = on_path(found)
     assert s.min() - 1 < PICK < s.max() + 1
+
+
+def test_a_march_ends_where_strays_alone_go_on():
+    points, _ = straight_ridge(12000, noise=0.05, half=(40, 10))
+    random = np.random.default_rng(7)
+    strays = random.uniform([40, -10, -3], [90, 10, 6], (400, 3))
+    window = window_on(np.concatenate([points, strays]))
+    chain = [template_at(position=(6.4 * i, 0, 0), points=300, evidence=200.0) for i in range(5)]
+    found: list[Template] = []
+    march_one_way(window, window, chain, found, SETTINGS.marching())
+    assert found and max(t.position[0] for t in found) < 42.0

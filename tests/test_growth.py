@@ -1,0 +1,66 @@
+"""A ridge fitted as a whole: what is left of a march astray, and how it goes on beyond its march."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracles import straight_ridge, template_at
+
+import ridgefeature as rf
+from ridgefeature.grid import build_grid
+from ridgefeature.joint_stations import Refit, refitted
+from ridgefeature.section import bell
+from ridgefeature.stations import lay_out
+from ridgefeature.template import Template
+
+SETTINGS = rf.Settings()
+
+
+def known(*x: float, **values) -> list[Template]:
+    """Templates at places along the x axis."""
+    told = {"std": np.full(8, 0.05), "scale": 0.05, "points": 300, **values}
+    return [template_at(position=(place, 0, 0), **told) for place in x]
+
+
+def whole(points: np.ndarray, templates: list[Template], settings: rf.Settings = SETTINGS) -> Refit:
+    stations = lay_out(tuple(templates), settings, False)
+    return refitted(build_grid(points), stations, bell(), False, (True, True), settings)
+
+
+@pytest.mark.parametrize("hole", [(0.0, 0.0), (14.0, 21.0)])
+def test_a_ridge_known_in_part_grows_over_a_gap_to_the_last_width(hole):
+    points, _ = straight_ridge(24000, noise=0.05, half=(40, 14))
+    x = points[:, 0]
+    ridge = whole(points[(x < hole[0]) | (x > hole[1])], known(*np.arange(-30.0, 5.0, 6.4)))
+    ends = np.sort(ridge.stations.spine[[0, -1], 0])
+    assert -40.9 < ends[0] < -39.0 and 39.0 < ends[1] < 40.9
+    assert np.abs(ridge.stations.height - 3.0).max() < 0.3
+
+
+def test_over_a_gap_wider_than_it_may_look_ahead_it_does_not():
+    points, _ = straight_ridge(24000, noise=0.05, half=(40, 14))
+    x = points[:, 0]
+    points = points[(x < 8.0) | (x > 24.0)]
+    ridge = whole(points, known(*np.arange(-30.0, 1.0, 6.4)))
+    assert 7.0 < ridge.stations.spine[:, 0].max() < 8.9
+    ridge = whole(points, known(*np.arange(-30.0, 1.0, 6.4)), rf.Settings(look_ahead=2.5))
+    assert 39.0 < ridge.stations.spine[:, 0].max() < 40.9
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_of_a_march_astray_what_is_alike_is_left(side):
+    """It left the ridge for the flat ground beside it, where it saw a higher one."""
+    points, _ = straight_ridge(24000, noise=0.05, half=(40, 30))
+    on = known(*np.arange(-36.0, 1.0, 6.4))
+    last = on[-1].position
+    astray = [
+        template_at(
+            position=(last[0] + 3 * i, side * 5.4 * i, 0), height=9.0, turn=(0, 0, side * 1.1), std=on[0].std
+        )
+        for i in range(1, 6)
+    ]
+    ridge = whole(points, [*on, *astray])
+    assert ridge.joint is not None
+    assert np.abs(ridge.stations.spine[:, 1]).max() < 0.5
+    assert np.abs(ridge.stations.height - 3.0).max() < 0.3
+    assert ridge.stations.arc_length[-1] > 30.0
