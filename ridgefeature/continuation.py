@@ -19,7 +19,7 @@ FLAT = "no ridge: the data agree with a flat base"
 _MISFIT, _LEAST_MISFIT = 2.0, 0.1
 """A fit whose noise is this many times the least of the last five, and this part of its height, has met
 something else."""
-_STEPS_ACROSS = (0.5, 1.0)
+_STEPS_ACROSS = (0.4, 0.55, 0.7, 0.85, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
 _CORNERS_TRIED = 3
