@@ -32,6 +32,9 @@ _BEYOND_EVIDENCE = 0.3
 _USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
+_RISEN, _FEW = 1.5, 3
+"""Height of a template, in the same part, from which on it is asked whether it is one of a ridge at all; how
+many tell what was usual."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -89,6 +92,12 @@ def outgrown(fitted: Template, chain: list[Template]) -> str:
     """Why a template is no part of a ridge as the last ones show it: another, wider rise under it."""
     usual = statistics.median(t.width for t in chain[-_USUAL:])
     return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
+
+
+def risen(fitted: Template, chain: list[Template]) -> bool:
+    """Whether a template is so much higher than the last ones that it may be the edge of the surface."""
+    usual = statistics.median(abs(t.height) for t in chain[-_USUAL:])
+    return len(chain) >= _FEW and abs(fitted.height) > _RISEN * usual
 
 
 def met(template: Template, others: list[Template]) -> int:

@@ -10,7 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.continuation import FLAT, across, append, met, misfits, outgrown, reject, round_corner
+from ridgefeature.alternatives import distinct
+from ridgefeature.continuation import (
+    FLAT,
+    across,
+    append,
+    met,
+    misfits,
+    outgrown,
+    reject,
+    risen,
+    round_corner,
+)
 from ridgefeature.curvature import Ahead, Found
 from ridgefeature.improve import improve, start_loss
 from ridgefeature.neighbours import comes_home
@@ -71,6 +82,8 @@ def _fit_next(
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    if not found[2] and risen(found[1], chain) and distinct(rough, found[1], settings) < settings.going_on:
+        return (*found[:2], "no ridge: it runs into an edge")
     if not found[2] and not gap and misfits(found[1], chain):
         other = across(rough, chain, settings) or round_corner(rough, chain, settings)
         if other is not None:
