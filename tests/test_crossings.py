@@ -109,7 +109,7 @@ def test_a_ridge_ends_where_it_runs_into_the_edge_of_a_plate(seed, slope, over):
     low, high = np.sort(found.spine[[0, -1], 0])
     assert low < -39
     assert 22 < high < 32 + 2.0 * W
-    assert found.height.max() < 1.25 * H
+    assert found.height.max() < 1.5 * H  # up to this none is asked whether it is an edge
 
 
 def test_only_what_is_much_higher_than_several_before_is_asked_whether_it_is_an_edge():
