@@ -15,6 +15,7 @@ from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.one_hump import one_hump, symmetric_hump
 from ridgefeature.section import Section, box
 from ridgefeature.smearing import Smeared
+from ridgefeature.unseen import unseen_std
 
 Array = NDArray[np.float64]
 
@@ -128,10 +129,11 @@ class SectionStd:
 def section_std(
     points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], inflation: float
 ) -> SectionStd:
-    """How sure a learned section is; arguments as for `free_section`. Zeros for one that has a name."""
-    section = seen.section
+    """How sure a learned section is; arguments as for `free_section`. One that has a name is as sure as its
+    flanks were seen."""
+    section, gap = seen.section, unseen_std(points, terms, seen, noise[0])
     if section.name not in (LEARNED, FREE, box().name):
-        return SectionStd()
+        return SectionStd(half_height_width=gap, width=gap)
     spans = section.spans
     matrix, right = _sums(points, terms, seen, noise, spans, 1.0)
     inverse = _smoothest(matrix, right, spans)[2]
@@ -154,7 +156,7 @@ def section_std(
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     half = std(high - low)
     blur = float(np.median(seen.blur))
-    half = math.hypot(half, _HALF_BLUR * blur)
+    half = math.hypot(half, _HALF_BLUR * blur, gap)
     foot = math.hypot(_FOOT_STD, _FOOT_BLUR * blur)
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
