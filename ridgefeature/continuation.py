@@ -10,7 +10,7 @@ import numpy as np
 
 from ridgefeature.curvature import starts_on_base
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.neighbours import LEAST_ADVANCE
+from ridgefeature.neighbours import LEAST_ADVANCE, advances
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -23,6 +23,8 @@ _STEPS_ACROSS = (0.5, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
 _CORNERS_TRIED = 3
+_WITHIN = 0.5
+"""Lengths before the end of a template from which on it may lie in a bend."""
 _CORNER_RADIUS = 0.5
 _ABOUT_STRAIGHT = (-30.0, 30.0)
 _WORSE_ACROSS = (3.0, 1.5)
@@ -168,6 +170,7 @@ def _best_beyond(
             and _alike(fitted, last)
             and not reject(fitted, start, settings, gap=True)
             and met(fitted, chain[:-1]) < 0
+            and advances(last, fitted)
         ):
             return start, fitted, why
     return None
@@ -179,29 +182,39 @@ def _alike(fitted: Template, last: Template) -> bool:
 
 
 def corners(
-    chain: list[Template], settings: Settings, angles: tuple[float, ...] = _CORNERS
+    chain: list[Template], settings: Settings, angles: tuple[float, ...] = _CORNERS, before: float = 0.0
 ) -> list[Template]:
     """Starts of the next template behind a sharp bend, by angles in degrees, to either side.
 
-    The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on.
+    The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on, or
+    by `before` lengths before it.
     """
     last = chain[-1]
     straight = append(chain[-1:], settings)[0]
     along, left, up = last.rotation.T
+    end = last.end - before * last.length * along
     found = []
     for angle in np.radians(angles):
         radius = _CORNER_RADIUS * last.width * np.sign(angle)
         ahead = np.cos(angle) * along + np.sin(angle) * left
-        corner = last.end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
+        corner = end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
         axes = np.column_stack([ahead, np.cross(up, ahead), up])
         found.append(straight.changed(position=corner + 0.5 * straight.length * ahead, rotation=axes))
     return found
 
 
 def round_corner(
-    rough: Window, chain: list[Template], settings: Settings
+    rough: Window, chain: list[Template], settings: Settings, within: bool = False
 ) -> tuple[Template, Template, str] | None:
-    """The next template behind a sharp bend, where the ridge goes on there beyond doubt."""
+    """The next template behind a sharp bend, where the ridge goes on there beyond doubt.
+
+    within: the last template may lie half in the bend.
+    """
     scale = chain[-1].scale
-    starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, scale))
-    return _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
+    for before in (0.0, _WITHIN) if within else (0.0,):
+        starts = corners(chain, settings, before=before)
+        starts.sort(key=lambda start: start_loss(rough, start, scale))
+        found = _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
+        if found is not None:
+            return found
+    return None

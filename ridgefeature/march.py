@@ -88,7 +88,7 @@ def _fit_next(
         hopeless = found[1].scale > _FITS_NOT * abs(found[1].height)
         return (*found[:2], "no ridge: what follows has another section") if hopeless else found
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
-        return round_corner(rough, chain, settings) or found
+        return round_corner(rough, chain, settings, found[2].startswith(FLAT)) or found
     if not found[2].startswith(FLAT):
         return found
     for known in (chain, _without_last(chain, settings)):
