@@ -34,9 +34,11 @@ _BEYOND_EVIDENCE = 0.3
 _USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
-_FEWER, _SPARSE = 0.75, 0.35
-"""Points of a template, in usual ones, below which their density is looked at; density of strays alone, in
-that of the last ones."""
+_FEWER, _NOISY = 0.75, 1.2
+"""Points of a template, in usual ones, below which their density is looked at; noise beyond a gap, in that
+usual, above which it is."""
+_SPARSE = 0.35, 0.42
+"""Density of strays alone, in that of the last templates: of few points, of noisy ones."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -96,14 +98,20 @@ def outgrown(fitted: Template, chain: list[Template]) -> str:
     return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
 
 
-def sparse(full: Window, fitted: Template, chain: list[Template]) -> str:
-    """Why a template lies on strays alone: beyond the border of the data there are far fewer points."""
+def sparse(full: Window, fitted: Template, chain: list[Template], gap: bool = False) -> str:
+    """Why a template lies on strays alone: beyond the border of the data there are far fewer points.
+
+    gap: it lies beyond a gap. Strays give themselves away by their noise there.
+    """
     known = [t for t in chain if t.evidence > 0.0][-_USUAL:]
-    if not known or fitted.points >= _FEWER * statistics.median(t.points for t in known):
+    if not known:
+        return ""
+    noisy = gap and fitted.scale > _NOISY * statistics.median(t.scale for t in known)
+    if not noisy and fitted.points >= _FEWER * statistics.median(t.points for t in known):
         return ""
     # The least of the last five: a scan is not everywhere as dense.
     least = min(_density(full, t) for t in known)
-    return "the data end here" if _density(full, fitted) < _SPARSE * least else ""
+    return "the data end here" if _density(full, fitted) < _SPARSE[noisy] * least else ""
 
 
 def _density(full: Window, template: Template) -> float:
@@ -171,6 +179,7 @@ def _best_beyond(
             and not reject(fitted, start, settings, gap=True)
             and met(fitted, chain[:-1]) < 0
             and advances(last, fitted)
+            and not sparse(rough.source or rough, fitted, chain, gap=True)
         ):
             return start, fitted, why
     return None

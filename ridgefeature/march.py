@@ -120,7 +120,11 @@ def _fit_best(
         if best is not None and i >= len(starts) and best[1].evidence < _HOPELESS:
             break
         fitted = improve(window, start, settings)
-        why = reject(fitted, start, settings, gap) or outgrown(fitted, chain) or sparse(full, fitted, chain)
+        why = (
+            reject(fitted, start, settings, gap)
+            or outgrown(fitted, chain)
+            or sparse(full, fitted, chain, gap)
+        )
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
         if fitted.status == "no data" or (not why and fitted.scale < suspect):
