@@ -10,7 +10,7 @@ import numpy as np
 
 from ridgefeature.curvature import starts_on_base
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
-from ridgefeature.neighbours import LEAST_ADVANCE
+from ridgefeature.neighbours import LEAST_ADVANCE, advances
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -23,6 +23,8 @@ _STEPS_ACROSS = (0.4, 0.55, 0.7, 0.85, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
 _CORNERS_TRIED = 3
+_WITHIN = 0.5
+"""Lengths before the end of a template from which on it may lie in a bend."""
 _CORNER_RADIUS = 0.5
 _ABOUT_STRAIGHT = (-30.0, 30.0)
 _WORSE_ACROSS = (3.0, 1.5)
@@ -32,12 +34,14 @@ _BEYOND_EVIDENCE = 0.3
 _USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
-_FEWER, _SPARSE = 0.75, 0.35
-"""Points of a template, in usual ones, below which their density is looked at; density of strays alone, in
-that of the last ones."""
 _RISEN, _FEW = 1.5, 3
 """Height of a template, in the same part, from which on it is asked whether it is one of a ridge at all; how
 many tell what was usual."""
+_FEWER, _NOISY = 0.75, 1.2
+"""Points of a template, in usual ones, below which their density is looked at; noise beyond a gap, in that
+usual, above which it is."""
+_SPARSE = 0.35, 0.42
+"""Density of strays alone, in that of the last templates: of few points, of noisy ones."""
 _LARGEST_TURN = np.radians(60.0)
 
 
@@ -97,14 +101,20 @@ def outgrown(fitted: Template, chain: list[Template]) -> str:
     return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
 
 
-def sparse(full: Window, fitted: Template, chain: list[Template]) -> str:
-    """Why a template lies on strays alone: beyond the border of the data there are far fewer points."""
+def sparse(full: Window, fitted: Template, chain: list[Template], gap: bool = False) -> str:
+    """Why a template lies on strays alone: beyond the border of the data there are far fewer points.
+
+    gap: it lies beyond a gap. Strays give themselves away by their noise there.
+    """
     known = [t for t in chain if t.evidence > 0.0][-_USUAL:]
-    if not known or fitted.points >= _FEWER * statistics.median(t.points for t in known):
+    if not known:
+        return ""
+    noisy = gap and fitted.scale > _NOISY * statistics.median(t.scale for t in known)
+    if not noisy and fitted.points >= _FEWER * statistics.median(t.points for t in known):
         return ""
     # The least of the last five: a scan is not everywhere as dense.
     least = min(_density(full, t) for t in known)
-    return "the data end here" if _density(full, fitted) < _SPARSE * least else ""
+    return "the data end here" if _density(full, fitted) < _SPARSE[noisy] * least else ""
 
 
 def _density(full: Window, template: Template) -> float:
@@ -177,6 +187,8 @@ def _best_beyond(
             and _alike(fitted, last)
             and not reject(fitted, start, settings, gap=True)
             and met(fitted, chain[:-1]) < 0
+            and advances(last, fitted)
+            and not sparse(rough.source or rough, fitted, chain, gap=True)
         ):
             return start, fitted, why
     return None
@@ -188,29 +200,39 @@ def _alike(fitted: Template, last: Template) -> bool:
 
 
 def corners(
-    chain: list[Template], settings: Settings, angles: tuple[float, ...] = _CORNERS
+    chain: list[Template], settings: Settings, angles: tuple[float, ...] = _CORNERS, before: float = 0.0
 ) -> list[Template]:
     """Starts of the next template behind a sharp bend, by angles in degrees, to either side.
 
-    The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on.
+    The bend is a circle about whose centre the ridge's foot turns, from the end of the last template on, or
+    by `before` lengths before it.
     """
     last = chain[-1]
     straight = append(chain[-1:], settings)[0]
     along, left, up = last.rotation.T
+    end = last.end - before * last.length * along
     found = []
     for angle in np.radians(angles):
         radius = _CORNER_RADIUS * last.width * np.sign(angle)
         ahead = np.cos(angle) * along + np.sin(angle) * left
-        corner = last.end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
+        corner = end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
         axes = np.column_stack([ahead, np.cross(up, ahead), up])
         found.append(straight.changed(position=corner + 0.5 * straight.length * ahead, rotation=axes))
     return found
 
 
 def round_corner(
-    rough: Window, chain: list[Template], settings: Settings
+    rough: Window, chain: list[Template], settings: Settings, within: bool = False
 ) -> tuple[Template, Template, str] | None:
-    """The next template behind a sharp bend, where the ridge goes on there beyond doubt."""
+    """The next template behind a sharp bend, where the ridge goes on there beyond doubt.
+
+    within: the last template may lie half in the bend.
+    """
     scale = chain[-1].scale
-    starts = sorted(corners(chain, settings), key=lambda start: start_loss(rough, start, scale))
-    return _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
+    for before in (0.0, _WITHIN) if within else (0.0,):
+        starts = corners(chain, settings, before=before)
+        starts.sort(key=lambda start: start_loss(rough, start, scale))
+        found = _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
+        if found is not None:
+            return found
+    return None

@@ -94,7 +94,7 @@ def _fit_next(
         hopeless = found[1].scale > _FITS_NOT * abs(found[1].height)
         return (*found[:2], "no ridge: what follows has another section") if hopeless else found
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
-        return round_corner(rough, chain, settings) or found
+        return round_corner(rough, chain, settings, found[2].startswith(FLAT)) or found
     if not found[2].startswith(FLAT):
         return found
     for known in (chain, _without_last(chain, settings)):
@@ -126,7 +126,11 @@ def _fit_best(
         if best is not None and i >= len(starts) and best[1].evidence < _HOPELESS:
             break
         fitted = improve(window, start, settings)
-        why = reject(fitted, start, settings, gap) or outgrown(fitted, chain) or sparse(full, fitted, chain)
+        why = (
+            reject(fitted, start, settings, gap)
+            or outgrown(fitted, chain)
+            or sparse(full, fitted, chain, gap)
+        )
         if best is None or (best[2] and not why) or (not why and fitted.scale < best[1].scale):
             best = start, fitted, why
         if fitted.status == "no data" or (not why and fitted.scale < suspect):

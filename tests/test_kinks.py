@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import ridgefeature as rf
-from ridgefeature.section import bell
+from ridgefeature.section import bell, plateau
 
 ARM, WIDTH, HEIGHT = 45.0, 10.0, 2.0
 
@@ -48,3 +48,15 @@ def test_a_straight_ridge_ends_where_it_ends() -> None:
         ridge = rf.register(scan_of(path, seed, noise=0.15), at=(-30, 0, HEIGHT))
         x = ridge.spine[:, 0]
         assert abs(x.min() - path[0, 0]) < 0.5 * WIDTH and abs(x.max() - path[-1, 0]) < 0.5 * WIDTH
+
+
+@pytest.mark.parametrize("place", np.arange(-38.0, -30.0, 2.0))
+def test_a_kink_is_followed_wherever_templates_end_in_it(place: float) -> None:
+    """Templates as long as the flat top of the ridge allows: one ends somewhere in the bend."""
+    path = bent_path(90.0)
+    away, _ = cKDTree(path).query(xy := np.random.default_rng(7).uniform(-55, 60, (9000, 2)))
+    points = np.column_stack([xy, HEIGHT * plateau()(np.minimum(away / WIDTH, 0.5))])
+    ridge = rf.register(
+        points + np.random.default_rng(8).normal(0, 0.04, points.shape), at=(place, 0, HEIGHT)
+    )
+    assert (cKDTree(ridge.spine[:, :2]).query(path)[0] < 0.4 * WIDTH).mean() > 0.95
