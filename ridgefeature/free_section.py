@@ -37,6 +37,8 @@ _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
 _LEAST_SPANS = 20
+_AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
+"""Of three coefficients, in the height at the middle one's knot."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -92,6 +94,8 @@ def free_section(
         return None
     cost = 0.5 * price * freedom
     found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * len(points), cost))
+    if not np.convolve(found[3:-6], _AT_KNOT).max() > 0:
+        return None
     gain = _gain(matrix, right, found, seen.section, spans, wider)
     return FreeSection(found, wider, gain, part * freedom, shift * wider / spans)
 

@@ -17,7 +17,7 @@ _DEEP = 0.1
 _CORRELATED = 2.5
 """Variance of sums over neighbouring points, by that of independent noise, beyond which the ground is not
 of the second degree that a base is."""
-_WORSE = 1.1
+_WORSE = 1.3
 """Noise on the level base, in that on the hollow one, beyond which this one stays."""
 _FLANK = 0.1
 """Breadth of the flanks, in widths, that are looked at beside a ridge in a valley."""

@@ -161,7 +161,8 @@ def test_tracks_that_a_person_read_off_real_scans_are_covered(file, suffix, kind
         seed, read = scan["seed" + suffix], scan["ref_path" + suffix]
     found = rf.register(points, at=seed, kind=kind)
     eta = np.linspace(-0.5, 0.5, 2001)
-    top = float(eta[found.section(eta) >= 0.95][[0, -1]].mean())
+    # Some are deepest along both edges of their floor, by up to a twentieth: its middle is what was read.
+    top = float(eta[found.section(eta) >= 0.9][[0, -1]].mean())
     crest = found.spine + (top * found.width)[:, None] * found.across + found.height[:, None] * found.normal
     fine = np.linspace(0, 1, 400)
     crest, read = (

@@ -53,6 +53,19 @@ def test_where_both_flanks_are_unseen_the_band_holds_all_that_they_may_be(seed):
     assert np.median(seen.half_height_width_std) < 0.2 * std
 
 
+@pytest.mark.parametrize("seen", [0.1, 0.25])
+def test_of_a_ridge_seen_from_one_side_the_symmetric_section_carries_over(seen):
+    """Nothing is seen beyond so many widths from the spine, neither the flank nor the ground."""
+    random = np.random.default_rng(1)
+    x, y = random.uniform(-40, 40, 60_000), random.uniform(-30, 30, 60_000)
+    points = np.column_stack([x, y, 3.0 * cosine()(y / 10.0)]) + random.normal(0, 0.02, (60_000, 3))
+    ridge = rf.register(points[points[:, 1] < 10.0 * seen], at=(0.0, 0.0, 3.0))
+    assert ridge.length > 78
+    assert np.median(ridge.height) == pytest.approx(3.0, rel=0.01)
+    assert np.median(ridge.half_height_width) == pytest.approx(5.0, rel=0.02)
+    assert abs(np.median(ridge.spine[:, 1])) < 0.2
+
+
 def seen_section(hidden: tuple[float, float], symmetric: bool = True) -> float:
     """What gaps in one flank of a section leave; hidden: places without points, in widths."""
     random = np.random.default_rng(5)

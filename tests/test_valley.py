@@ -56,14 +56,31 @@ def test_turned_and_scaled_the_ridge_in_a_valley_is_the_same():
     np.testing.assert_allclose(np.median(other.width), 0.01 * np.median(one.width), rtol=0.05)
 
 
+def in_pipe(x: np.ndarray, y: np.ndarray, z: np.ndarray, radius: float) -> np.ndarray:
+    """Points at heights z over the inside of a pipe along x."""
+    return np.column_stack([x, (radius - z) * np.sin(y / radius), radius - (radius - z) * np.cos(y / radius)])
+
+
 @pytest.mark.parametrize("noise", [0.005, 0.015])
 @pytest.mark.parametrize(("radius", "height"), [(3.0, 0.2), (6.0, 0.15)])
 def test_the_inside_of_a_pipe_stays_curved(radius, height, noise):
     random = np.random.default_rng(4)
     n = 26_000
     x, y = random.uniform(0, 14, n), random.uniform(-3, 3, n)
-    r, angle = radius - height * cosine()(y), y / radius
-    points = np.column_stack([x, r * np.sin(angle), radius - r * np.cos(angle)])
-    ridge = registered(points + noise * random.normal(size=(n, 3)), np.array([7.0, 0.0, height]))
+    points = in_pipe(x, y, height * cosine()(y), radius) + noise * random.normal(size=(n, 3))
+    ridge = registered(points, np.array([7.0, 0.0, height]))
     assert np.median(ridge.curvature) == pytest.approx(1 / radius, rel=0.15)
     assert np.median(ridge.height) == pytest.approx(height, rel=0.05)
+
+
+@pytest.mark.parametrize("lines", [1, 4])
+def test_the_inside_of_a_pipe_stays_curved_where_the_noise_is_in_bands(lines):
+    """Each scan line across the pipe is off by as much as its neighbours, or not."""
+    random, spacing = np.random.default_rng(3), 0.08
+    x, y = (v.ravel() for v in np.meshgrid(np.arange(0, 14, spacing), np.arange(-3, 3, spacing)))
+    off = np.convolve(random.normal(size=400), np.ones(lines) / np.sqrt(lines), "same")
+    z = 0.2 * cosine()(y) + 0.01 * off[(x / spacing).round().astype(int)]
+    points = in_pipe(x, y, z, 4.0) + 0.005 * random.normal(size=(len(x), 3))
+    ridge = registered(points, np.array([7.0, 0.0, 0.2]))
+    assert np.median(ridge.curvature) == pytest.approx(1 / 4.0, rel=0.15)
+    assert np.median(ridge.height) == pytest.approx(0.2, rel=0.05)
