@@ -96,7 +96,7 @@ def _refitted(
 def _core(stations: Stations) -> Stations | None:
     """The longest stretch whose height and width are near the usual: what is left of a march astray.
 
-    Without half a width at either end, which what follows may have bent. None where that is too short, or all
+    Without a width at either end, which what follows may have bent. None where that is too short, or all
     of it.
     """
     height, width = (v / np.median(v) for v in (stations.height, stations.width))
@@ -106,7 +106,7 @@ def _core(stations: Stations) -> Stations | None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]]))).reshape(-1, 2)
     first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
     s, usual = stations.arc_length, float(np.median(stations.width))
-    low, high = s[first] + 0.5 * usual * (first > 0), s[last - 1] - 0.5 * usual * (last < len(s))
+    low, high = s[first] + usual * (first > 0), s[last - 1] - usual * (last < len(s))
     if high - low < _SHORTEST * usual:
         return None
     kept = (s >= low) & (s <= high)
