@@ -17,6 +17,8 @@ from ridgefeature.template import Template
 Array = NDArray[np.float64]
 
 _PER_TEMPLATE = 4
+_SCATTERED, _DIFFERENT = 3.0, 1.2
+"""Noise, in the usual one, and height, in that of its neighbours, from which on a template is out of line."""
 _MOST = 401
 
 
@@ -94,13 +96,30 @@ def _normal(template: Template, part: float) -> Array:
     return np.asarray(template.rotation @ standing(place, np.eye(3), template.base)[1][:, 2])
 
 
+def in_line(templates: tuple[Template, ...]) -> tuple[Template, ...]:
+    """The templates without those whose points scatter more than usual and that differ from both neighbours.
+
+    Their fit went wrong: what lies between the neighbours is known better without them.
+    """
+    usual = _SCATTERED * float(np.median([t.scale for t in templates]))
+    heights = [abs(t.height) for t in templates]
+
+    def astray(i: int) -> bool:
+        low, high = sorted((heights[i - 1], heights[i + 1]))
+        return templates[i].scale > usual and not low / _DIFFERENT < heights[i] < _DIFFERENT * high
+
+    return tuple(t for i, t in enumerate(templates) if i in (0, len(templates) - 1) or not astray(i))
+
+
 def lay_out(templates: tuple[Template, ...], settings: Settings, closed: bool = False) -> Stations:
     """Stations of a chain of fitted templates; closed: the last station is the first again.
 
     The spine is a C2 spline through the templates' centres and outer ends; height and width are natural cubic
     splines through the templates' values in arc length, so the standard deviations follow by the same linear
-    map. On a ring, which begins at the first template's centre, all splines are periodic.
+    map. On a ring, which begins at the first template's centre, all splines are periodic. A template that is
+    out of line among its neighbours is left out.
     """
+    templates = in_line(templates)
     way = _ring(templates) if closed else _open_path(templates)
     k = int(np.clip(_PER_TEMPLATE * len(templates) + 1, 13, _MOST))
     s = np.linspace(0.0, way.total, k)

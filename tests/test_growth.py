@@ -10,7 +10,7 @@ import ridgefeature as rf
 from ridgefeature.grid import build_grid
 from ridgefeature.joint_stations import Refit, refitted
 from ridgefeature.section import bell
-from ridgefeature.stations import lay_out
+from ridgefeature.stations import in_line, lay_out
 from ridgefeature.template import Template
 
 SETTINGS = rf.Settings()
@@ -64,3 +64,15 @@ def test_of_a_march_astray_what_is_alike_is_left(side):
     assert np.abs(ridge.stations.spine[:, 1]).max() < 0.5
     assert np.abs(ridge.stations.height - 3.0).max() < 0.3
     assert ridge.stations.arc_length[-1] > 30.0
+
+
+def test_a_template_out_of_line_among_its_neighbours_is_left_out():
+    good = known(*np.arange(-36.0, 37.0, 6.4), scale=0.01)
+    assert in_line(tuple(good)) == tuple(good)
+    poor = template_at(position=(-4.0, 1.0, 0.5), height=1.8, std=good[5].std, scale=0.2)
+    assert in_line((*good[:5], poor, *good[6:])) == (*good[:5], *good[6:])
+    # A ridge may well be lower somewhere, or noisier; and of an end there is but one neighbour.
+    low, noisy = poor.changed(scale=0.01), good[5].changed(scale=0.2)
+    assert in_line((*good[:5], low, *good[6:])) == (*good[:5], low, *good[6:])
+    assert in_line((*good[:5], noisy, *good[6:])) == (*good[:5], noisy, *good[6:])
+    assert in_line((poor, *good)) == (poor, *good)
