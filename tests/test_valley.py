@@ -35,8 +35,13 @@ def registered(points: np.ndarray, crest: np.ndarray) -> rf.Ridge:
 
 @pytest.mark.parametrize(
     ("left", "right"),
-    [((0.1, 0.25), (0.7, 0.12)), ((0.1, 0.25), (0.1, 0.3)), ((0.0, 0.4), (0.0, 0.4))],
-    ids=["one side far", "both near", "no floor"],
+    [
+        ((0.1, 0.25), (0.7, 0.12)),
+        ((0.1, 0.25), (0.1, 0.3)),
+        ((0.0, 0.4), (0.7, 0.12)),
+        ((0.0, 0.4), (0.0, 0.4)),
+    ],
+    ids=["one side far", "both near", "one side steep", "no floor"],
 )
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_slopes_beside_a_valley_do_not_raise_the_ridge_in_it(left, right, seed):
@@ -44,7 +49,7 @@ def test_slopes_beside_a_valley_do_not_raise_the_ridge_in_it(left, right, seed):
     ridge = registered(points, np.array([LENGTH / 2, 0.0, HEIGHT]))
     assert np.median(ridge.height) == pytest.approx(HEIGHT, rel=0.15)
     assert np.median(ridge.half_height_width) == pytest.approx(WIDTH / 2, rel=0.08)
-    assert not ridge.curvature.any()
+    assert ridge.length > 0.9 * LENGTH
 
 
 def test_turned_and_scaled_the_ridge_in_a_valley_is_the_same():

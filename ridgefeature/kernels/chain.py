@@ -14,6 +14,8 @@ from ridgefeature.kernels.evidence import plane_loss
 from ridgefeature.kernels.residual import OPTIONS, loss_jet
 
 Floats = NDArray[np.float64]
+_OTHER_GROUND = 0.5
+"""Rise of a base from foot to foot, in heights, that is no error of its tilt any more."""
 _FEWEST_OUTSIDE = 12
 _BEYOND_DOUBT = 10.0
 """Log likelihood ratio that a ridge never loses by chance."""
@@ -83,8 +85,13 @@ def trends(positions: Floats, frames: Floats, sizes: Floats, half_breadths: Floa
 
 
 @njit(**OPTIONS)
-def _levelled(points: Floats, width: float, trend: Floats, scale: float, loss: int, tuning: float) -> Floats:
-    """The points (n, 3) with the robust plane through those outside the feet taken off."""
+def _levelled(
+    points: Floats, height: float, width: float, trend: Floats, scale: float, loss: int, tuning: float
+) -> Floats:
+    """The points (n, 3) with the robust plane through those outside the feet taken off.
+
+    None is where it rises from foot to foot by more than a part of the height: slopes beside a valley do so.
+    """
     n, m = points.shape[0], 0
     outside = np.empty((n, 3))
     for i in range(n):
@@ -95,6 +102,8 @@ def _levelled(points: Floats, width: float, trend: Floats, scale: float, loss: i
     out = points.copy()
     if m >= _FEWEST_OUTSIDE:
         _, plane = plane_loss(outside[:m], scale, loss, tuning, 5)
+        if abs(plane[2]) * width > _OTHER_GROUND * abs(height):
+            return out
         for i in range(n):
             out[i, 2] -= plane[0] + plane[1] * points[i, 0] + plane[2] * points[i, 1]
     return out
@@ -118,7 +127,7 @@ def change_point(
     is another ridge (Page 1954, CUSUM). -inf where the ridge explains nothing. The base is levelled by the
     points outside the feet first: far ahead a small error of its tilt would look like a ridge.
     """
-    points = _levelled(points, width, trend, scale, loss, tuning)
+    points = _levelled(points, height, width, trend, scale, loss, tuning)
     ridge = residuals(points, height, width, trend, table)
     base = residuals(points, 0.0, width, trend, table)
     order = np.argsort(points[:, 0].copy(), kind="mergesort")
