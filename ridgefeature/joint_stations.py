@@ -32,8 +32,6 @@ _GROWTHS, _MUCH = 20, 0.3
 """How often the ends are looked for further out; by how many widths they must have moved for that."""
 _ALIKE = 0.75
 """Least height and width of the same ridge, in those that are usual; the largest are its reciprocal."""
-_ON, _OTHER = 0.5, 2.0
-"""Distance in widths between stretches of one place, and along the ridge between different ones."""
 _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
@@ -121,16 +119,11 @@ def _grown(
 ) -> tuple[Stations, Array | None, Joint]:
     """Stations between the ends, these ends' intervals, and the fit that told them.
 
-    A ridge that is seen further out than the march went may go on beyond what was looked at. One that would
-    run into itself beyond a gap does not go over it.
+    A ridge that is seen further out than the march went may go on beyond what was looked at.
     """
     for _ in range(_GROWTHS):
         before = float(laid.arc_length[-1])
-        grown, intervals = _between_ends(grid, laid, joint, open_ends, settings, flat)
-        if _runs_into_itself(grown):
-            near = replace(settings, look_ahead=0.0)
-            grown, intervals = _between_ends(grid, laid, joint, open_ends, near, flat)
-        laid = grown
+        laid, intervals = _between_ends(grid, laid, joint, open_ends, settings, flat)
         if float(laid.arc_length[-1]) < before + _MUCH * float(np.median(laid.width)):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
@@ -138,13 +131,6 @@ def _grown(
             break
         joint, laid = again, stations_of(again, len(laid.arc_length), settings)
     return laid, intervals, joint
-
-
-def _runs_into_itself(stations: Stations) -> bool:
-    """Whether a stretch of the spine lies on another one."""
-    s, spine, width = stations.arc_length, stations.spine, stations.width
-    apart = np.linalg.norm(spine[:, None] - spine, axis=2)
-    return bool(((apart < _ON * width) & (s - s[:, None] > _OTHER * width)).any())
 
 
 def _upright(
