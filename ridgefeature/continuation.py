@@ -206,12 +206,9 @@ def corners(
     found = []
     for angle in np.radians(angles):
         radius = _CORNER_RADIUS * last.width * np.sign(angle)
-        ahead, aside = (
-            np.cos(angle) * along + np.sin(angle) * left,
-            np.cos(angle) * left - np.sin(angle) * along,
-        )
-        corner = end + radius * (left - aside)
-        axes = np.column_stack([ahead, aside, up])
+        ahead = np.cos(angle) * along + np.sin(angle) * left
+        corner = end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
+        axes = np.column_stack([ahead, np.cross(up, ahead), up])
         found.append(straight.changed(position=corner + 0.5 * straight.length * ahead, rotation=axes))
     return found
 
