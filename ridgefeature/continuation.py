@@ -19,7 +19,7 @@ FLAT = "no ridge: the data agree with a flat base"
 _MISFIT, _LEAST_MISFIT = 2.0, 0.1
 """A fit whose noise is this many times the least of the last five, and this part of its height, has met
 something else."""
-_STEPS_ACROSS = (0.5, 1.0)
+_STEPS_ACROSS = (0.4, 0.55, 0.7, 0.85, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
 _SHARPEST = (-60.0, 60.0, -90.0, 90.0)
 _CORNERS = (-30.0, 30.0, *_SHARPEST)
@@ -35,6 +35,9 @@ _BEYOND_EVIDENCE = 0.3
 _USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
+_RISEN, _FEW = 1.5, 3
+"""Height of a template, in the same part, from which on it is asked whether it is one of a ridge at all; how
+many tell what was usual."""
 _FEWER, _NOISY = 0.75, 1.2
 """Points of a template, in usual ones, below which their density is looked at; noise beyond a gap, in that
 usual, above which it is."""
@@ -118,6 +121,12 @@ def sparse(full: Window, fitted: Template, chain: list[Template], gap: bool = Fa
 def _density(full: Window, template: Template) -> float:
     """Points by area of a template's window."""
     return len(full(template)) / (2.0 * template.half_breadth * template.length)
+
+
+def risen(fitted: Template, chain: list[Template]) -> bool:
+    """Whether a template is so much higher than the last ones that it may be the edge of the surface."""
+    usual = statistics.median(abs(t.height) for t in chain[-_USUAL:])
+    return len(chain) >= _FEW and abs(fitted.height) > _RISEN * usual
 
 
 def met(template: Template, others: list[Template]) -> int:

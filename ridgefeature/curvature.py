@@ -152,7 +152,7 @@ def less_noisy(bent: Template, flat: Template) -> bool:
 def _chi_square(degrees: int, chance: float) -> float:
     """Value that chi-square of so many degrees exceeds by this chance (Wilson and Hilferty 1931)."""
     share = 2.0 / (9.0 * degrees)
-    return degrees * (1.0 - share + NormalDist().inv_cdf(1.0 - chance) * share**0.5) ** 3
+    return degrees * (1.0 - share - NormalDist().inv_cdf(chance) * share**0.5) ** 3
 
 
 def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...]:

@@ -15,6 +15,7 @@ from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.one_hump import one_hump, symmetric_hump
 from ridgefeature.section import Section, box
 from ridgefeature.smearing import Smeared
+from ridgefeature.unseen import unseen_std
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,8 @@ _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
 _LEAST_SPANS = 20
+_AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
+"""Of three coefficients, in the height at the middle one's knot."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -91,6 +94,8 @@ def free_section(
         return None
     cost = 0.5 * price * freedom
     found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * len(points), cost))
+    if not np.convolve(found[3:-6], _AT_KNOT).max() > 0:
+        return None
     gain = _gain(matrix, right, found, seen.section, spans, wider)
     return FreeSection(found, wider, gain, part * freedom, shift * wider / spans)
 
@@ -128,10 +133,11 @@ class SectionStd:
 def section_std(
     points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], inflation: float
 ) -> SectionStd:
-    """How sure a learned section is; arguments as for `free_section`. Zeros for one that has a name."""
-    section = seen.section
+    """How sure a learned section is; arguments as for `free_section`. One that has a name is as sure as its
+    flanks were seen."""
+    section, gap = seen.section, unseen_std(points, terms, seen, noise[0])
     if section.name not in (LEARNED, FREE, box().name):
-        return SectionStd()
+        return SectionStd(half_height_width=gap, width=gap)
     spans = section.spans
     matrix, right = _sums(points, terms, seen, noise, spans, 1.0)
     inverse = _smoothest(matrix, right, spans)[2]
@@ -154,7 +160,7 @@ def section_std(
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     half = std(high - low)
     blur = float(np.median(seen.blur))
-    half = math.hypot(half, _HALF_BLUR * blur)
+    half = math.hypot(half, _HALF_BLUR * blur, gap)
     foot = math.hypot(_FOOT_STD, _FOOT_BLUR * blur)
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.alternatives import distinct
 from ridgefeature.curvature import improve_on_base, less_noisy
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
@@ -16,7 +17,6 @@ from ridgefeature.kernels.search import best_straight_ridge, principal_axes
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
-from ridgefeature.verdict import distinct
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]

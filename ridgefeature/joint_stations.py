@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.grid import Grid
-from ridgefeature.joint import MOST_POINTS, SOME_POINTS, Joint, fit_whole
+from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
+from ridgefeature.joint_rounds import is_steep
 from ridgefeature.kernels.strip import A, C, E, H, W
 from ridgefeature.path_frame import PathFrame, path_frame
 from ridgefeature.section import Section
@@ -77,6 +78,7 @@ def _refitted(
 ) -> tuple[Refit, bool]:
     """The same of all these stations, and whether it is sound to the end."""
     flat = settings.flat
+    stations, section = _upright(grid, stations, section, closed, settings, flat)
     first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:
         return Refit(stations), False
@@ -95,7 +97,7 @@ def _refitted(
 def _core(stations: Stations) -> Stations | None:
     """The longest stretch whose height and width are near the usual: what is left of a march astray.
 
-    Without half a width at either end, which what follows may have bent. None where that is too short, or the
+    Without a width at either end, which what follows may have bent. None where that is too short, or the
     march did not go astray.
     """
     sizes = np.abs([np.log(np.maximum(v / np.median(v), 1e-9)) for v in (stations.height, stations.width)])
@@ -105,7 +107,7 @@ def _core(stations: Stations) -> Stations | None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]]))).reshape(-1, 2)
     first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
     s, usual = stations.arc_length, float(np.median(stations.width))
-    low, high = s[first] + 0.5 * usual * (first > 0), s[last - 1] - 0.5 * usual * (last < len(s))
+    low, high = s[first] + usual * (first > 0), s[last - 1] - usual * (last < len(s))
     if high - low < _SHORTEST * usual:
         return None
     kept = (s >= low) & (s <= high)
@@ -130,6 +132,21 @@ def _grown(
             break
         joint, laid = again, stations_of(again, len(laid.arc_length), settings)
     return laid, intervals, joint
+
+
+def _upright(
+    grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
+) -> tuple[Stations, Section]:
+    """Stations and section of a steep ridge as its fit begins: high flanks lean where the base is wrong."""
+    path = path_frame(stations, closed)
+    if not is_steep(path) or settings.section not in FOUND:
+        return stations, section
+    begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
+    if begun is None or not _sound(begun):
+        return stations, section
+    if not stations.curvature.any() and begun.bent < _BENT:
+        begun = begun.without(C)
+    return stations_of(begun, len(stations.arc_length), settings), begun.section
 
 
 def _fit(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.alternatives import distinct
 from ridgefeature.continuation import (
     FLAT,
     across,
@@ -18,6 +19,7 @@ from ridgefeature.continuation import (
     misfits,
     outgrown,
     reject,
+    risen,
     round_corner,
     sparse,
 )
@@ -45,6 +47,8 @@ _HOPELESS = 3.0
 """Evidence below which further starts at the same place are not tried."""
 _WORSE = 1.5
 """A fit whose noise is this many times that usual of the last three templates is suspect."""
+_EDGE = 10.0
+"""Evidence against an edge below which a template that rises high above the last ones is one."""
 _FITS_NOT = 0.35
 """Noise, in heights, above which such a fit is none."""
 
@@ -81,6 +85,8 @@ def _fit_next(
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    if not found[2] and risen(found[1], chain) and distinct(rough, found[1], settings) < _EDGE:
+        return (*found[:2], "no ridge: it runs into an edge")
     if not found[2] and not gap and misfits(found[1], chain):
         other = across(rough, chain, settings) or round_corner(rough, chain, settings)
         if other is not None:

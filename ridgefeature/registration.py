@@ -13,7 +13,6 @@ from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
-from ridgefeature.joint_stations import refitted
 from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, with_section
 from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
@@ -23,6 +22,7 @@ from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
+from ridgefeature.valley import fitted_over_ground
 from ridgefeature.verdict import no_ridge
 from ridgefeature.window import Window
 
@@ -81,7 +81,7 @@ def register(
     stations, section, intervals = lay_out(templates, settings, track.closed), templates[0].section, None
     if settings.measure == "residual":
         ends = not track.stop[0].startswith(GOES_ON), not track.stop[1].startswith(GOES_ON)
-        found = refitted(grid, stations, section, track.closed, ends, settings)
+        found = fitted_over_ground(grid, stations, section, track.closed, ends, settings)
         stations, intervals = found.stations, found.end_interval
         section = section if found.joint is None else found.joint.section
     return Ridge(

@@ -68,9 +68,15 @@ class Section:
     @cached_property
     def half_height_width(self) -> float:
         """Full width at half height as a part of the width between the feet."""
+        low, high = self.half_height_places
+        return high - low
+
+    @cached_property
+    def half_height_places(self) -> tuple[float, float]:
+        """The lowest and the highest place at half height, in widths from the middle between the feet."""
         eta = np.linspace(-0.5, 0.5, 2001)
         above = eta[self(eta) >= 0.5]
-        return float(self._crossing(above[-1]) - self._crossing(above[0]))
+        return self._crossing(float(above[0])), self._crossing(float(above[-1]))
 
     def _crossing(self, eta: float) -> float:
         """Where the height is one half, by Newton's method from eta near by."""

@@ -25,6 +25,8 @@ _SMOOTH, _FEW = 0.02, 5
 """Up to which blur a Gauss-Hermite quadrature of so many places is enough."""
 _FINE = 0.015
 """Distance of a quadrature's places in widths, else."""
+_APART, _MOST_PLACES = 1.0, 800
+"""The same for a likelihood, in noise deviations up the steepest flank; but no more places than that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,12 @@ def log_likelihood(
     a, b, c, e, h, w = (np.interp(points[:, 0], nodes, terms[:, k]) for k in range(terms.shape[1]))
     y = points[:, 1]
     own, sizes = np.column_stack([y - e, points[:, 2] - a - y * (b + c * y)]), np.column_stack([h, w])
-    rule = _rule(float(np.clip(noise / np.median(w), _LEAST_BLUR, _MOST_BLUR)))
+    blur = float(np.clip(noise / np.median(w), _LEAST_BLUR, _MOST_BLUR))
+    steepest = float(np.median(np.abs(h) / w) * np.abs(section(np.linspace(-0.5, 0.5, 401), 1)).max())
+    # Up a flank the places of the quadrature stand no further apart than the noise reaches.
+    rule = _even_rule(
+        blur, max(min(_FINE, _APART * blur / max(steepest, 1.0)), 2.0 * _REACH * blur / _MOST_PLACES)
+    )
     return float(kernel(own, section.table, sizes, even, *rule, noise, strays, span))
 
 
@@ -93,6 +100,11 @@ def _rule(blur: float) -> tuple[Array, Array]:
     if blur <= _SMOOTH:
         places, shares = np.polynomial.hermite.hermgauss(_FEW)
         return np.asarray(np.sqrt(2.0) * places), np.asarray(shares / np.sqrt(np.pi))
-    places = np.linspace(-_REACH, _REACH, 2 * int(np.ceil(_REACH * max(blur / _FINE, 2.0))) + 1)
+    return _even_rule(blur, _FINE)
+
+
+def _even_rule(blur: float, apart: float) -> tuple[Array, Array]:
+    """The same with even places, so far apart in widths, for noise of this deviation in widths."""
+    places = np.linspace(-_REACH, _REACH, 2 * int(np.ceil(_REACH * max(blur / apart, 2.0))) + 1)
     shares = np.exp(-0.5 * places**2)
     return places, np.asarray(shares / shares.sum())

@@ -4,30 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ridgefeature.improve import FEWEST_POINTS
-from ridgefeature.kernels.alternatives import advantage
-from ridgefeature.kernels.base import on_base
+from ridgefeature.alternatives import distinct
 from ridgefeature.march import GOES_ON, Track
 from ridgefeature.settings import Settings
-from ridgefeature.template import Template
 from ridgefeature.window import Window
-
-_LEAST_CONTRAST = 0.05
-"""Least noise scale, in parts of the height: misfit of the section is no evidence for another surface."""
-
-
-def distinct(window: Window, template: Template, settings: Settings) -> float:
-    """Twice the log likelihood ratio of the ridge against the better of a smooth surface and an edge."""
-    points = window(template)
-    if len(points) < FEWEST_POINTS or template.height == 0:
-        return 0.0
-    scale = max(template.scale, _LEAST_CONTRAST * abs(template.height))
-    size = 0.5 * template.length, template.half_breadth, scale, settings.tuning
-    views = [points]
-    if template.base.any():
-        # On a base that is curved by mistake an edge no longer looks like one.
-        views.append(on_base(points, template.base))
-    return min(min(advantage(points, seen, *template.shape, *size)) for seen in views)
 
 
 def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, settings: Settings) -> str:

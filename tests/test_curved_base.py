@@ -459,3 +459,12 @@ def test_a_base_of_the_wrong_shape_is_refused():
     document["templates"][0]["base"] = [1.0, 2.0]
     with pytest.raises(ValueError, match=r"template's base of shape \(3,\).*got \(2,\).*save"):
         from_document(document)
+
+
+def test_a_chance_of_next_to_none_still_tells_a_flat_base():
+    random = np.random.default_rng(2)
+    x, y = random.uniform(0, 60, 4000), random.uniform(-12, 12, 4000)
+    points = np.column_stack([x, y, H * bell()(y / W) + NOISE * random.normal(size=4000)])
+    ridge = rf.register(points, at=(30.0, 0.0, H), settings=rf.Settings(base_chance=1e-40))
+    assert not ridge.curvature.any()
+    assert np.median(ridge.height) == pytest.approx(H, rel=0.02)

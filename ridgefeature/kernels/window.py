@@ -105,6 +105,26 @@ def _rows(
     return out, i
 
 
+@njit(forceinline=True)
+def _cell_points(points: Floats, first: int, last: int, place: tuple[float, ...], cell: Floats) -> int:
+    """Box coordinates of the points `first` to `last` - 1 that a box holds, into cell (3, k); how many."""
+    ox, oy, oz, hx, hy, hz, xx, xy, xz, yx, yy, yz, zx, zy, zz = place
+    k = 0
+    for j in range(first, last):
+        dx, dy, dz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
+        px = dx * xx + dy * xy + dz * xz
+        py = dx * yx + dy * yy + dz * yz
+        pz = dx * zx + dy * zy + dz * zz
+        cell[0, k], cell[1, k], cell[2, k] = px, py, pz
+        k += abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz
+    return k
+
+
+@njit(forceinline=True)
+def _put(row: Floats, cell: Floats, j: int) -> None:
+    row[0], row[1], row[2] = cell[0, j], cell[1, j], cell[2, j]
+
+
 @njit(cache=True)
 def box_points(
     points: Floats,
@@ -126,7 +146,7 @@ def box_points(
         total += rows[i, 2]
         for c in range(rows[i, 0], rows[i, 1]):
             largest = max(largest, starts[c + 1] - starts[c])
-    ox, oy, oz, hx, hy, hz, xx, xy, xz, yx, yy, yz, zx, zy, zz = _scalars(origin, axes, half)
+    place = _scalars(origin, axes, half)
     out = np.empty((total, 3))
     cell, order = np.empty((3, largest)), np.empty(largest, np.int64)
     m = 0
@@ -144,23 +164,15 @@ def box_points(
                     chosen = chosen_row(block, every)
                 if chosen >= last:
                     continue
-            k = 0
-            for j in range(first, last):
-                dx, dy, dz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
-                px = dx * xx + dy * xy + dz * xz
-                py = dx * yx + dy * yy + dz * yz
-                pz = dx * zx + dy * zy + dz * zz
-                cell[0, k], cell[1, k], cell[2, k] = px, py, pz
-                k += abs(px) <= hx and abs(py) <= hy and abs(pz) <= hz
+            k = _cell_points(points, first, last, place, cell)
             ordered(cell, k, order)
             if every == 1:
                 for j in range(k):
-                    out[m, 0], out[m, 1], out[m, 2] = cell[0, order[j]], cell[1, order[j]], cell[2, order[j]]
-                    m += 1
+                    _put(out[m + j], cell, order[j])
+                m += k
                 continue
             while chosen < first + k:
-                j = order[chosen - first]
-                out[m, 0], out[m, 1], out[m, 2] = cell[0, j], cell[1, j], cell[2, j]
+                _put(out[m], cell, order[chosen - first])
                 m += 1
                 block += 1
                 chosen = chosen_row(block, every)
@@ -263,9 +275,8 @@ def ball_points(
     for a in range(3):
         reach = radius * (1.0 + 1e-14) + 1e-15 * abs(centre[a])
         spans[a, 0], spans[a, 1] = _span(levels, frame, a, centre[a] - reach, centre[a] + reach)
-    total = 0
+    total, m = 0, 0
     out = np.empty((0, 3))
-    m = 0
     for fill in range(2):
         for z in range(spans[2, 0], spans[2, 1] + 1):
             for y in range(spans[1, 0], spans[1, 1] + 1):

@@ -1,0 +1,164 @@
+"""The rounds of a joint refit: all terms fitted again to the points, from what is known so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.foot_points import distances
+from ridgefeature.foot_points import information as foot_information
+from ridgefeature.kernels.strip import C, W, information, mixture, offsets
+from ridgefeature.noise import EXACT, Noise, blur_of, inflation_of
+from ridgefeature.path_frame import PathFrame, wanted_differences
+from ridgefeature.section import Section
+from ridgefeature.smearing import log_likelihood, smear
+from ridgefeature.smoothing import Smooth, basis_at, smoothest
+
+Array = NDArray[np.float64]
+
+_STEEP = 0.4
+"""Height by width from which on it matters how a fit begins."""
+_NEXT_MIXTURE = 3
+_TELLING = 5000
+"""As many points tell how likely a state is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What a round of the fit found, and the normal equations that it solved."""
+
+    smooth: Smooth
+    matrix: Array
+    goal: Array
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """What is known of a ridge between two rounds of its fit."""
+
+    terms: Array
+    section: Section
+    noise: Noise
+    weights: Array
+    inflation: float = 1.0
+    fit: Fit | None = None
+    """None before the first round."""
+
+    def lying(self, even: float) -> State:
+        """With points that lie evenly over the base, 0, or over the surface, 1."""
+        return replace(self, noise=replace(self.noise, even=even))
+
+    def given(self, section: Section, terms: Array) -> State:
+        return replace(self, section=section, terms=terms)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What stays the same through all rounds: some of the points, the path, what its smoothness asks for."""
+
+    some: Array
+    path: PathFrame
+    flat: bool
+    wanted: Array
+    height: float
+    width: float
+    steep: bool
+
+    def thinned(self) -> Task:
+        """With as many points as tell which of several states is the likeliest."""
+        return replace(self, some=self.some[:: 1 + len(self.some) // _TELLING])
+
+
+def task_of(some: Array, path: PathFrame, flat: bool) -> Task:
+    """The task of fitting a ridge along a path to points that lie along it."""
+    height, width = _sizes(path)
+    return Task(some, path, flat, wanted_differences(path), height, width, is_steep(path))
+
+
+def is_steep(path: PathFrame) -> bool:
+    """Whether flanks rise so much that a fit must begin near them."""
+    height, width = _sizes(path)
+    return height >= _STEEP * width
+
+
+def _sizes(path: PathFrame) -> tuple[float, float]:
+    """The usual height and width."""
+    known, width = np.abs(path.height[path.height != 0]), float(np.median(path.width))
+    return float(np.median(known)) if len(known) else width, width
+
+
+def improved(task: Task, points: Array, state: State | None, left: int, near: bool = False) -> State | None:
+    """All terms fitted again to points; None where nothing finite came of it.
+
+    left: rounds still to come: until then what the terms miss is no stray yet. near: by the distances of the
+    points from the nearest places of the section (ridgefeature.foot_points), all of them of `task`.
+    """
+    if state is None:
+        return None
+    path = task.path
+    told = EXACT * task.height, 2.0**left
+    found = _by_foot_points(points, state, *told) if near else _linearised(points, task.some, state, *told)
+    matrix, goal, noise, gain = found
+    if not np.isfinite(matrix).all() or not np.isfinite(gain):
+        return None
+    inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
+    goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
+    matrix, goal = gain / inflation * matrix, gain / inflation * goal
+    if task.flat:
+        _fix(matrix, goal, C)
+    middle = 0.5 * (path.knots[1:] + path.knots[:-1])
+    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, state.weights)
+    first, basis = basis_at(path.coefficients, path.knots)
+    terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
+    if not np.isfinite(terms).all():
+        return None
+    terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
+    return State(terms, state.section, noise, smooth.weights, inflation, Fit(smooth, matrix, goal))
+
+
+def chance(points: Array, state: State) -> float:
+    """Log likelihood of the heights of points."""
+    noise = state.noise
+    points = points[:: 1 + len(points) // _TELLING]
+    told = noise.blur, noise.even, noise.strays, noise.span
+    return log_likelihood(points, state.terms, state.section, *told)
+
+
+def _linearised(
+    points: Array, some: Array, state: State, least: float, more: float
+) -> tuple[Array, Array, Noise, float]:
+    """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood.
+
+    least: of the noise; more: by how much the least scale is more, from which on a distance tells a stray.
+    """
+    terms, noise = state.terms, state.noise
+    seen = smear(state.section, terms, noise.blur, noise.even).told
+    off, far = offsets(some, terms, seen, noise.scale)
+    told = noise.scale, noise.strays, noise.span, more * least
+    scale, strays, density = mixture(off, far, *told, _NEXT_MIXTURE)
+    blur = blur_of(some, terms, off, scale, noise.span, least)
+    matrix, right, sums = information(points, terms, seen, scale, density)
+    gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
+    return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain
+
+
+def _by_foot_points(
+    points: Array, state: State, least: float, more: float
+) -> tuple[Array, Array, Noise, float]:
+    """The same by distances from the nearest places of the section."""
+    terms, noise = state.terms, state.noise
+    off, rows = distances(points, terms, state.section)
+    told = noise.scale, noise.strays, noise.span, more * least
+    scale, strays, density = mixture(off, np.abs(off), *told, _NEXT_MIXTURE)
+    blur = blur_of(points, terms, off, scale, noise.span, least)
+    matrix, right, sums = foot_information(points, len(terms) - 1, off, rows, scale, density)
+    gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
+    return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain
+
+
+def _fix(matrix: Array, goal: Array, term: int) -> None:
+    """Let normal equations ask for 0 of one term, whatever the others are."""
+    goal[:, term] = matrix[:, term] = matrix[:, :, term] = 0.0
+    matrix[:, term, term] = 1.0
