@@ -21,7 +21,8 @@ _MISFIT, _LEAST_MISFIT = 2.0, 0.1
 something else."""
 _STEPS_ACROSS = (0.4, 0.55, 0.7, 0.85, 1.0)
 """How far beyond a place where ridges meet this one is looked for, in parts of how far to look ahead."""
-_CORNERS = (-30.0, 30.0, -60.0, 60.0, -90.0, 90.0)
+_SHARPEST = (-60.0, 60.0, -90.0, 90.0)
+_CORNERS = (-30.0, 30.0, *_SHARPEST)
 _CORNERS_TRIED = 3
 _WITHIN = 0.5
 """Lengths before the end of a template from which on it may lie in a bend."""
@@ -229,8 +230,8 @@ def round_corner(
     within: the last template may lie half in the bend.
     """
     scale = chain[-1].scale
-    for before in (0.0, _WITHIN) if within else (0.0,):
-        starts = corners(chain, settings, before=before)
+    for before, angles in ((0.0, _CORNERS), (_WITHIN, _SHARPEST))[: 1 + within]:
+        starts = corners(chain, settings, angles, before)
         starts.sort(key=lambda start: start_loss(rough, start, scale))
         found = _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
         if found is not None:

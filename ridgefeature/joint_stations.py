@@ -30,8 +30,9 @@ _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _GROWTHS, _MUCH = 20, 0.3
 """How often the ends are looked for further out; by how many widths they must have moved for that."""
-_ALIKE = 0.75
-"""Least height and width of the same ridge, in those that are usual; the largest are its reciprocal."""
+_ALIKE, _ASTRAY = 1.33, 1.6
+"""Factor between height or width and those that are usual up to which it is the same ridge; from which on a
+march may have gone astray."""
 _SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end."""
 
@@ -96,12 +97,12 @@ def _refitted(
 def _core(stations: Stations) -> Stations | None:
     """The longest stretch whose height and width are near the usual: what is left of a march astray.
 
-    Without a width at either end, which what follows may have bent. None where that is too short, or all
-    of it.
+    Without a width at either end, which what follows may have bent. None where that is too short, or the
+    march did not go astray.
     """
-    height, width = (v / np.median(v) for v in (stations.height, stations.width))
-    alike = (height > _ALIKE) & (height < 1 / _ALIKE) & (width > _ALIKE) & (width < 1 / _ALIKE)
-    if alike.all() or not alike.any():
+    sizes = np.abs([np.log(np.maximum(v / np.median(v), 1e-9)) for v in (stations.height, stations.width)])
+    alike = (sizes < np.log(_ALIKE)).all(axis=0)
+    if (sizes < np.log(_ASTRAY)).all() or not alike.any():
         return None
     edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]]))).reshape(-1, 2)
     first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]

@@ -74,7 +74,7 @@ class Settings:
         1e-3,
         "chance at which a flat base is taken for a curved one; 0.5 or more: bases are flat",
     )
-    look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage")
+    look_ahead: float = _setting(1.0, "how far to look ahead over a weak passage or a gap")
     max_templates: int = _setting(500, "templates in all")
 
     def __post_init__(self) -> None:

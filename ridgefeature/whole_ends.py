@@ -96,10 +96,13 @@ def ends_of(
     The joint was fitted further out. open_ends: which of both may move. ahead: widths
     without data over which a ridge is followed.
     """
+    one = min(NODES_A_WIDTH, len(joint.path.at) - 2)
+    shown = (*evidence(joint, one), *evidence(joint, one // 2))
     if open_ends[1]:
-        end = _end_of(joint, start, end, ahead)
+        end = _end_of(joint, shown, start, end, ahead)
     if open_ends[0]:
-        start = -_end_of(_backwards(joint), -end, -start, ahead)
+        backwards = tuple(values[::-1] for values in shown)
+        start = -_end_of(_backwards(joint), backwards, -end, -start, ahead)
     return start, end
 
 
@@ -111,16 +114,18 @@ def _backwards(joint: Joint) -> Joint:
     return replace(joint, path=path, **turned)
 
 
-def _end_of(joint: Joint, start: float, end: float, ahead: float) -> float:
-    """Where a ridge ends whose last end is known to be near `end`."""
+def _end_of(joint: Joint, shown: tuple[Array, ...], start: float, end: float, ahead: float) -> float:
+    """Where a ridge ends whose last end is known to be near `end`.
+
+    shown: evidence and height of windows of one width and of a half.
+    """
     path = joint.path
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
     inside = (path.at >= start) & (path.at <= end)
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
     count = _windows(joint.counts, near) / _windows(path.width[1:] ** 2, near)
     dense = count > _DENSE * np.median(count[inside[:-near]])
-    found, height = evidence(joint, one)
-    half, above = evidence(joint, one // 2)
+    found, height, half, above = shown
     half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
     seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
     k = _end(seen, height, dense, joint.terms[:, H], high, one, near, ahead * one + near)
