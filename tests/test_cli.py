@@ -233,7 +233,12 @@ def test_an_interrupted_march_keeps_and_writes_what_it_has(
     scan_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(register_command, "shown_progress", _interrupting(6))
-    result = run("register", scan_file, *AT, "--out", tmp_path, "--json")
+    # What runs in the background is often started with interrupts ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        result = run("register", scan_file, *AT, "--out", tmp_path, "--json")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert result.exit_code == 130
     assert len(result.stderr.splitlines()) == 1 and "interrupted" in result.stderr
     assert json.loads(result.stdout)["interrupted"] is True
