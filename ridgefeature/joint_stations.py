@@ -13,6 +13,7 @@ from ridgefeature.grid import Grid
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
 from ridgefeature.joint_rounds import is_steep
 from ridgefeature.kernels.strip import A, C, E, H, W
+from ridgefeature.own_beginning import as_ring
 from ridgefeature.path_frame import PathFrame, path_frame
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -45,6 +46,7 @@ class Refit:
     joint: Joint | None = None
     end_interval: Array | None = None
     """(2, 2) as in Ridge."""
+    closed: bool = False
 
 
 def refitted(
@@ -81,17 +83,20 @@ def _refitted(
     stations, section = _upright(grid, stations, section, closed, settings, flat)
     first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:
-        return Refit(stations), False
+        return Refit(stations, closed=closed), False
     if not stations.curvature.any() and first.bent < _BENT:
         flat = True
         first = first.without(C)
     laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
         laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat)
+        ring = as_ring(laid)
+        if ring is not None:
+            laid, intervals, closed = ring, None, True
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
-        return Refit(laid, first, intervals), False
-    return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals), True
+        return Refit(laid, first, intervals, closed), False
+    return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed), True
 
 
 def _core(stations: Stations) -> Stations | None:
@@ -125,7 +130,7 @@ def _grown(
     for _ in range(_GROWTHS):
         before = float(laid.arc_length[-1])
         laid, intervals = _between_ends(grid, laid, joint, open_ends, settings, flat)
-        if float(laid.arc_length[-1]) < before + _MUCH * float(np.median(laid.width)):
+        if float(laid.arc_length[-1]) < before + _MUCH * float(np.median(laid.width)) or as_ring(laid):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:

@@ -16,7 +16,7 @@ from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, with_section
 from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
-from ridgefeature.rings import ring_or_not
+from ridgefeature.rings import CLOSED, ring_or_not
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
@@ -79,17 +79,20 @@ def register(
     track = _directed(track, pick, hints)
     templates = _with_distances(track.templates, grid)
     stations, section, intervals = lay_out(templates, settings, track.closed), templates[0].section, None
+    closed, stop = track.closed, track.stop
     if settings.measure == "residual":
         ends = not track.stop[0].startswith(GOES_ON), not track.stop[1].startswith(GOES_ON)
         found = fitted_over_ground(grid, stations, section, track.closed, ends, settings)
         stations, intervals = found.stations, found.end_interval
         section = section if found.joint is None else found.joint.section
+        if found.closed:
+            closed, stop = True, (CLOSED, CLOSED)
     return Ridge(
         **vars(stations),
         section=section,
         templates=templates,
-        stop=track.stop,
-        closed=track.closed,
+        stop=stop,
+        closed=closed,
         end_interval=intervals,
         unit=scan.unit,
         pick=pick,
