@@ -26,6 +26,8 @@ _CORNERS = (-30.0, 30.0, *_SHARPEST)
 _CORNERS_TRIED = 3
 _WITHIN = 0.5
 """Lengths before the end of a template from which on it may lie in a bend."""
+_WORSE_WITHIN = 1.6
+"""Most noise behind such a bend, in the least of the last five: beside an end may lie another ridge."""
 _CORNER_RADIUS = 0.5
 _ABOUT_STRAIGHT = (-30.0, 30.0)
 _WORSE_ACROSS = (3.0, 1.5)
@@ -230,10 +232,12 @@ def round_corner(
     within: the last template may lie half in the bend.
     """
     scale = chain[-1].scale
-    for before, angles in ((0.0, _CORNERS), (_WITHIN, _SHARPEST))[: 1 + within]:
+    for before, angles, worse in ((0.0, _CORNERS, math.inf), (_WITHIN, _SHARPEST, _WORSE_WITHIN))[
+        : 1 + within
+    ]:
         starts = corners(chain, settings, angles, before)
         starts.sort(key=lambda start: start_loss(rough, start, scale))
-        found = _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings)
+        found = _best_beyond(rough, chain, starts[:_CORNERS_TRIED], settings, worse)
         if found is not None:
             return found
     return None
