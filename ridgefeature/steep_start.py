@@ -6,14 +6,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.joint_rounds import State, Task, chance, improved
+from ridgefeature.kernels.strip import E, H, W
 from ridgefeature.noise import first_noise
-from ridgefeature.section import box
+from ridgefeature.section import Section, box
 from ridgefeature.shaping import with_half_height_width
 
 Array = NDArray[np.float64]
 
+_ABOUT = 0.2
+"""How far from the middle points are on the top, in widths at half height."""
 _NEAR_ROUNDS, _ROUNDS = 5, 3
 """By the nearest places of a section, and as it is seen, of each of the states that a fit may begin with."""
+
+
+def _topped(points: Array, terms: Array, section: Section) -> Array:
+    """The terms (n, 6) with the height at which most points about the middle lie.
+
+    Of a ridge that is taken for too high the points of the top are nearest to flanks: they would stay there.
+    """
+    place = points[:, 0].astype(np.int64)
+    eta = (points[:, 1] - terms[place, E]) / terms[place, W]
+    on = np.abs(eta) < _ABOUT * section.half_height_width
+    if not on.any():
+        return terms
+    out = terms.copy()
+    out[:, H] *= float(np.median(points[on, 2] / terms[place[on], H]) / np.median(section(eta[on])))
+    return out if out[:, H] @ terms[:, H] > 0 else terms
 
 
 def likeliest(task: Task, state: State) -> State | None:
@@ -23,6 +41,7 @@ def likeliest(task: Task, state: State) -> State | None:
     """
     task = task.thinned()
     points = task.some
+    state = state.given(state.section, _topped(points, state.terms, state.section))
     best, kept = -np.inf, None
     for section in dict.fromkeys((state.section, box())):
         terms = with_half_height_width(state.terms, state.section, section)
