@@ -171,3 +171,10 @@ def test_a_flat_template_among_others_does_not_hinder_the_choice_of_the_section(
     misfit = np.array([np.full(16, 100.0), np.full(16, 50.0)])
     assert not in_doubt(misfit, (flat,))
     assert in_doubt(misfit, (flat, flat.changed(height=3.0)))
+
+
+def test_a_template_changes_its_own_fields_alone():
+    t = Template(np.zeros(3), np.eye(3), 8.0, 3.0, 6.4, 2.4, bell())
+    assert t.changed(width=9.0).width == 9.0 and t.width == 8.0
+    with pytest.raises(TypeError, match="widht"):
+        t.changed(widht=9.0)
