@@ -68,6 +68,9 @@ def paste(
     """
     if fit not in FITS:
         raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
+    for which, rate in (("h", h), ("w", w)):
+        if isinstance(rate, bool) or not isinstance(rate, (int, float, np.integer, np.floating)):
+            raise ValueError(f"{which}: expected a number, a rate, got {rate!r}; 1 leaves the ridge as it is")
     solid = _solid_of(host)
     chosen = face_of(solid, _face_of(solid, face, path, at))
     where = (_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)

@@ -203,3 +203,9 @@ def test_flanks_are_narrowed_where_a_path_bends_and_the_feet_fit(ridge, box, top
     circle = cq.Edge.makeCircle(radius, cq.Vector(0, 0, 10))
     part = cx.paste(small.resized(w=0.5), box, face=top, path=circle, fit="trim", check=False)
     assert part.isValid() and part.Volume(1e-6) > box.Volume()
+
+
+@pytest.mark.parametrize(("name", "value"), [("h", "2"), ("h", None), ("w", "wide"), ("w", True)])
+def test_rates_are_numbers(ridge, box, top, name, value):
+    with pytest.raises(ValueError, match=f"^{name}: expected a number, a rate, got "):
+        cx.paste(ridge, box, face=top, **{name: value})
