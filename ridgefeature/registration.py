@@ -76,13 +76,17 @@ def register(
     except NoRidgeError:
         # What lies nearest to the pick is none: what explains most about it may be one.
         track = _track(rough, full, pick, extent, hints, settings, progress, aimed=False)
-    track = _directed(track, pick, hints)
+    return _constructed(grid, _directed(track, pick, hints), settings, scan, pick)
+
+
+def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick: Array) -> Ridge:
+    """The ridge of a settled march: fitted as a whole, where templates are fitted by residuals."""
     templates = _with_distances(track.templates, grid)
     stations, section, intervals = lay_out(templates, settings, track.closed), templates[0].section, None
     closed, stop = track.closed, track.stop
     if settings.measure == "residual":
-        ends = not track.stop[0].startswith(GOES_ON), not track.stop[1].startswith(GOES_ON)
-        found = fitted_over_ground(grid, stations, section, track.closed, ends, settings)
+        ends = not stop[0].startswith(GOES_ON), not stop[1].startswith(GOES_ON)
+        found = fitted_over_ground(grid, stations, section, closed, ends, settings)
         stations, intervals = found.stations, found.end_interval
         section = section if found.joint is None else found.joint.section
         if found.closed:
