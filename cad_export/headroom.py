@@ -141,12 +141,12 @@ def check_height(solid: TopoDS_Shape, base: FaceBase, ridge: Ridge, h: float = 1
     if limit.folds:
         raise ValueError(
             f"h: expected {most}, or the surface runs through itself where normals of the face meet, "
-            f"{limit.height:.4g} from it, at arc length {limit.s:.4g}; got {h:g}; use a smaller h, or a "
+            f"{limit.height:.4g} from it, at arc length {limit.s:.4g}; got {h:g}; use an h nearer to 0, or a "
             "face that bends less"
         )
     raise ValueError(
         f"h: expected {most}, or the surface runs into another part of the host, {limit.height:.4g} from the "
-        f"face, at arc length {limit.s:.4g}; got {h:g}; use a smaller h, or move the path"
+        f"face, at arc length {limit.s:.4g}; got {h:g}; use an h nearer to 0, or move the path"
     )
 
 

@@ -68,9 +68,7 @@ def paste(
     """
     if fit not in FITS:
         raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
-    for which, rate in (("h", h), ("w", w)):
-        if isinstance(rate, bool) or not isinstance(rate, (int, float, np.integer, np.floating)):
-            raise ValueError(f"{which}: expected a number, a rate, got {rate!r}; 1 leaves the ridge as it is")
+    check_rates(h=h, w=w)
     solid = _solid_of(host)
     chosen = face_of(solid, _face_of(solid, face, path, at))
     where = (_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
@@ -175,6 +173,13 @@ def _stand(
             return stand(float(w))
         raise
     return stand(float(w)) if own and found.base.slim else found
+
+
+def check_rates(**rates: object) -> None:
+    """Raise ValueError for rates that are no numbers, under their names."""
+    for name, rate in rates.items():
+        if isinstance(rate, bool) or not isinstance(rate, (int, float, np.integer, np.floating)):
+            raise ValueError(f"{name}: expected a number, a rate, got {rate!r}; 1 leaves the ridge as it is")
 
 
 def _site(solid: TopoDS_Shape, stand: _Stand, h: float, w: float) -> Site:

@@ -21,7 +21,7 @@ from cad_export.check import subshapes, volume
 from cad_export.geometry import topods
 from cad_export.loading import carried_in
 from cad_export.paste_history import from_text, known_volume
-from cad_export.pasting import paste
+from cad_export.pasting import check_rates, paste
 from cad_export.record import Carried, ridge_in
 from cad_export.step_file import read_step
 from cad_export.step_model import named
@@ -41,6 +41,7 @@ def regenerate(
     after its last paste: what was done to it since is not known, so run the script that made it instead. Of
     what was pasted before such a change, and pasted on later, the same holds.
     """
+    check_rates(**{which: rate for which, rate in (("h", h), ("w", w)) if rate is not None})
     shape, records = _read(part)
     pasted = [_Paste(r, r.placement, r.host["brep"]) for r in records if r.placement and r.host]
     if not pasted:

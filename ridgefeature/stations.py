@@ -11,6 +11,7 @@ from ridgefeature.basis import basis_matrix, periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.kernels.base import on_base, standing
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
+from ridgefeature.merge import LEAST_BORDER
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 
@@ -254,5 +255,5 @@ def _sizes(
 
 def border_of(width: Array, curvature: Array, settings: Settings) -> Array:
     """(k,) where the flanks end: less far out where the path bends, by its curvature (k,)."""
-    inner = np.maximum(0.9 / np.maximum(curvature, 1e-300), 0.55 * width)
+    inner = np.maximum(0.9 / np.maximum(curvature, 1e-300), 1.01 * LEAST_BORDER * width)
     return np.minimum((0.5 + settings.border) * width, inner)

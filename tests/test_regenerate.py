@@ -198,3 +198,9 @@ def test_what_is_remembered_is_bounded(part, ridge, monkeypatch):
         record.ridge_in(record.record_of(ridge.resized(h=scale)))
     assert len(record._RIDGES) == record._KEPT
     assert len(regeneration._INNER) <= 8
+
+
+@pytest.mark.parametrize("rates", [{"h": "2"}, {"w": True}, {"h": 1.0, "w": "wide"}])
+def test_rates_are_numbers(rates):
+    with pytest.raises(ValueError, match=r"^[hw]: expected a number, a rate, got "):
+        cx.regenerate("no.step", **rates)

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from ridgefeature import Settings
 from ridgefeature.bspline import Surface
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
-from ridgefeature.merge import along, merged_surface, template_surface
+from ridgefeature.merge import LEAST_BORDER, along, merged_surface, template_surface
 from ridgefeature.section import plateau
-from ridgefeature.stations import Stations, interpolating_curve, lay_out
+from ridgefeature.stations import Stations, border_of, interpolating_curve, lay_out
 
 TURN = Rotation.from_rotvec([0.3, -0.8, 1.7]).as_matrix()
 
@@ -247,3 +247,11 @@ def test_turning_all_stations_turns_the_poles(arc):
         arc, spine=arc.spine @ TURN.T + shift, normal=arc.normal @ TURN.T, tangent=arc.tangent @ TURN.T
     )
     np.testing.assert_allclose(turned.poles, surface_of(arc).poles @ TURN.T + shift, atol=1e-11)
+
+
+def test_borders_in_bends_leave_room_for_the_width_as_it_is():
+    """Else a ridge with a sharp bend could be made neither taller nor wider."""
+    width, radius = np.array([10.0, 10.0, 10.0]), np.array([100.0, 7.0, 1.0])
+    border = border_of(width, 1.0 / radius, Settings())
+    assert (border > 1.005 * LEAST_BORDER * width).all()
+    assert (np.diff(border) <= 0).all()

@@ -17,9 +17,7 @@ def output_folder(folder: Path, names: Iterable[str]) -> Iterator[Path]:
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     if folder.exists() and not folder.is_dir():
-        raise NotADirectoryError(
-            f"{folder}: expected a folder to write to, this is a file: name another with --out"
-        )
+        raise NotADirectoryError(f"{folder}: expected a folder to write to, this is a file: name another")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
