@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.strip import E, W, offsets
-from ridgefeature.section import Section
 from ridgefeature.smearing import Smeared
 
 Array = NDArray[np.float64]
@@ -34,17 +33,10 @@ def unseen_std(points: Array, terms: Array, seen: Smeared, scale: float) -> floa
     nodes = np.arange(len(terms))
     middle, width = (np.interp(points[on, 0], nodes, terms[:, k]) for k in (E, W))
     eta = (points[on, 1] - middle) / width
-    low, high = half_places(section)
+    low, high = section.half_height_places
     if np.abs(section.coefficients - section.coefficients[::-1]).max() < _ALIKE * section.coefficients.max():
         return 2.0 * _one_flank(np.abs(eta), high)
     return math.hypot(_one_flank(-eta[eta < 0], -low), _one_flank(eta[eta > 0], high))
-
-
-def half_places(section: Section) -> tuple[float, float]:
-    """The lowest and the highest place, in widths, where a section is half as high as its apex."""
-    eta = np.linspace(-0.5, 0.5, 2001)
-    above = eta[section(eta) >= 0.5]
-    return float(above[0]), float(above[-1])
 
 
 def _one_flank(places: Array, at: float) -> float:

@@ -9,7 +9,7 @@ import ridgefeature as rf
 from ridgefeature.kernels.strip import TERMS, H, W
 from ridgefeature.section import Section, cosine
 from ridgefeature.smearing import smear
-from ridgefeature.unseen import half_places, unseen_std
+from ridgefeature.unseen import unseen_std
 
 HEIGHT, CAP, FOOT, EDGE = 6.4, 2.0, 3.3, 5.5
 NOISE, SPACING, LENGTH = 0.08, 0.46, 70.0
@@ -81,7 +81,7 @@ def seen_section(hidden: tuple[float, float], symmetric: bool = True) -> float:
 def test_only_gaps_at_half_height_count():
     assert seen_section((9.0, 9.0)) == 0.0
     assert seen_section((0.35, 0.45), symmetric=False) == 0.0
-    low, high = half_places(Section(np.array([0.2, 0.5, 1.0, 0.3, 0.1]), "learned"))
+    low, high = Section(np.array([0.2, 0.5, 1.0, 0.3, 0.1]), "learned").half_height_places
     assert low < 0 < high
     found = seen_section((high - 0.05, high + 0.05), symmetric=False)
     assert found == pytest.approx(0.1 / np.sqrt(12), rel=0.1)
