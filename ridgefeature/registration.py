@@ -23,11 +23,12 @@ from ridgefeature.settle import finish_ends, settle, settle_base
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.valley import fitted_over_ground
-from ridgefeature.verdict import no_ridge
+from ridgefeature.verdict import no_ridge, unknown_height
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 KINDS = ("ridge", "groove", "auto")
+_ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
 
@@ -91,6 +92,9 @@ def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick:
         section = section if found.joint is None else found.joint.section
         if found.closed:
             closed, stop = True, (CLOSED, CLOSED)
+        why = unknown_height(stations)
+        if why:
+            raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
     return Ridge(
         **vars(stations),
         section=section,
@@ -131,10 +135,7 @@ def _track(
     track = finish_ends(full, track, settings)
     why = no_ridge(rough, track, pick, extent, settings)
     if why:
-        raise NoRidgeError(
-            f"no ridge at {_text(pick)}: {why}; pick a point on the ridge, or give direction=, width= and "
-            "height= as a start"
-        )
+        raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )

@@ -7,7 +7,11 @@ import numpy as np
 from ridgefeature.alternatives import distinct
 from ridgefeature.march import GOES_ON, Track
 from ridgefeature.settings import Settings
+from ridgefeature.stations import Stations
 from ridgefeature.window import Window
+
+_UNKNOWN = 0.5
+"""Standard deviation of the height, in heights, beyond which most of a ridge is not told from its base."""
 
 
 def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, settings: Settings) -> str:
@@ -34,3 +38,16 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, sett
         if evidence >= settings.distinct:
             return ""
     return f"a smooth surface or an edge explains it as well (evidence {evidence:.1f})"
+
+
+def unknown_height(stations: Stations) -> str:
+    """Why a fitted ridge is none after all: its height is hardly known; empty if it is.
+
+    Where a fit went through something else its standard deviations are about as large as the height.
+    """
+    height, std = np.abs(stations.height), stations.height_std
+    told = np.isfinite(std)
+    if not told.any() or np.median(std[told] / np.maximum(height[told], 1e-300)) <= _UNKNOWN:
+        return ""
+    found, known = np.median(height), np.median(std[told])
+    return f"the height of what was fitted there, {found:.4g}, is known to {known:.4g} only"

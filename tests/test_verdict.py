@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ import ridgefeature as rf
 from ridgefeature.kernels.alternatives import advantage, powers, robust_loss
 from ridgefeature.section import bell
 from ridgefeature.settings import Settings
+from ridgefeature.stations import Stations
+from ridgefeature.verdict import unknown_height
 
 FLAT = np.zeros(3)
 
@@ -140,3 +143,24 @@ def test_a_ridge_cut_short_on_purpose_may_be_short() -> None:
     x, y = rng.uniform(-30, 30, (2, 6000))
     points = np.column_stack([x, y, 2 * bell()(y / 10)]) + rng.normal(0, 0.05, (6000, 3))
     assert rf.register(points, at=(0, 0, 2), max_templates=1).length < 15
+
+
+def test_a_height_that_is_hardly_known_is_no_ridge():
+    s, ones = np.linspace(0.0, 30.0, 13), np.ones(13)
+    x, _, z = np.eye(3)
+    sure = Stations(
+        s,
+        s[:, None] * x,
+        np.tile(x, (13, 1)),
+        np.tile(z, (13, 1)),
+        -3.0 * ones,
+        8.0 * ones,
+        0.2 * ones,
+        ones,
+        ones,
+    )
+    assert unknown_height(sure) == ""
+    assert unknown_height(replace(sure, height_std=np.where(s < 14, 5.0, 0.2))) == "", "a part of it may be"
+    assert "known to 2" in unknown_height(replace(sure, height_std=2.0 * ones))
+    assert "known to 2" in unknown_height(replace(sure, height_std=np.where(s < 14, np.inf, 2.0)))
+    assert unknown_height(replace(sure, height_std=np.inf * ones)) == "", "fits by M tell none"
