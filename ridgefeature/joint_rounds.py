@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ridgefeature.foot_points import distances
 from ridgefeature.foot_points import information as foot_information
 from ridgefeature.kernels.strip import C, W, information, mixture, offsets
-from ridgefeature.noise import EXACT, Noise, blur_of, inflation_of
+from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame, wanted_differences
 from ridgefeature.section import Section
 from ridgefeature.smearing import log_likelihood, smear
@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 _STEEP = 0.4
 """Height by width from which on it matters how a fit begins."""
 _NEXT_MIXTURE = 3
+_ROUNDS, _LAST_ROUNDS = 2, 4
+"""In which weights of penalties become likelier; few of them as long as the terms are not known well: what was
+made straight then hardly bends again."""
 _TELLING = 5000
 """As many points tell how likely a state is."""
 
@@ -100,16 +103,17 @@ def improved(task: Task, points: Array, state: State | None, left: int, near: bo
     path = task.path
     told = EXACT * task.height, 2.0**left
     found = _by_foot_points(points, state, *told) if near else _linearised(points, task.some, state, *told)
-    matrix, goal, noise, gain = found
+    matrix, goal, noise, gain, local = found
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
-    matrix, goal = gain / inflation * matrix, gain / inflation * goal
+    known = gain / np.maximum(inflation, local)
+    matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
     if task.flat:
         _fix(matrix, goal, C)
     middle = 0.5 * (path.knots[1:] + path.knots[:-1])
-    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, state.weights)
+    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, state.weights, _ROUNDS if left or near else _LAST_ROUNDS)
     first, basis = basis_at(path.coefficients, path.knots)
     terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
     if not np.isfinite(terms).all():
@@ -128,7 +132,7 @@ def chance(points: Array, state: State) -> float:
 
 def _linearised(
     points: Array, some: Array, state: State, least: float, more: float
-) -> tuple[Array, Array, Noise, float]:
+) -> tuple[Array, Array, Noise, float, Array]:
     """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood.
 
     least: of the noise; more: by how much the least scale is more, from which on a distance tells a stray.
@@ -141,12 +145,16 @@ def _linearised(
     blur = blur_of(some, terms, off, scale, noise.span, least)
     matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
-    return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain
+    noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
+    if points is not some:
+        off, far = offsets(points, terms, seen, scale)
+    shares = 1.0 / (1.0 + density * np.exp(np.minimum(0.5 * (far / scale) ** 2, 50.0)))
+    return matrix, right, noise, gain, inflation_along(points, terms, off, shares, scale)
 
 
 def _by_foot_points(
     points: Array, state: State, least: float, more: float
-) -> tuple[Array, Array, Noise, float]:
+) -> tuple[Array, Array, Noise, float, Array]:
     """The same by distances from the nearest places of the section."""
     terms, noise = state.terms, state.noise
     off, rows = distances(points, terms, state.section)
@@ -155,7 +163,8 @@ def _by_foot_points(
     blur = blur_of(points, terms, off, scale, noise.span, least)
     matrix, right, sums = foot_information(points, len(terms) - 1, off, rows, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
-    return matrix, right, replace(noise, scale=scale, strays=strays, density=density, blur=blur), gain
+    noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
+    return matrix, right, noise, gain, np.ones(len(matrix))
 
 
 def _fix(matrix: Array, goal: Array, term: int) -> None:

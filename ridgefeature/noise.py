@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.strip import TERMS, E, H, W, mixture, offsets
+from ridgefeature.path_frame import NODES_A_WIDTH
 from ridgefeature.section import Section
 from ridgefeature.smearing import smear
 
@@ -23,6 +24,10 @@ _FEWEST = 60
 _BESIDE = 0.7
 """Distance from the spine in widths up to which points are counted to tell how evenly they lie."""
 _SOME_STRAYS = 0.05
+_STRIP, _FEW, _TOGETHER = 0.1, 3, 3
+"""Breadth of strips in widths; fewest points in a part one width long; parts whose sums are looked at together."""
+_SURE = 3.0
+"""Standard deviations from which on such sums are correlated."""
 _BLOCK = 5
 """Nodes over which noise may be correlated."""
 _MEDIAN = 0.89
@@ -98,6 +103,36 @@ def _evenness(points: Array, terms: Array, section: Section, noise: float) -> fl
     found = np.interp(eta[np.abs(eta) < _BESIDE], places, dense).mean()
     on_base, on_surface = dense[inner].mean(), (dense[inner] ** 2).mean() / dense[inner].mean()
     return float(np.clip((found - on_base) / max(on_surface - on_base, 1e-12), 0.0, 1.0))
+
+
+def inflation_along(points: Array, terms: Array, distances: Array, shares: Array, scale: float) -> Array:
+    """The same (n - 1,) of each stretch, by sums over narrow strips beside each other along the ridge.
+
+    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; distances (m,) from where points are
+    expected; shares (m,): chance that each is no stray. Points of one scan line may have an error in common:
+    where such lines run along the ridge their sums tell far less than so many points would.
+    """
+    nodes = np.arange(len(terms))
+    middle, width = (np.interp(points[:, 0], nodes, terms[:, k]) for k in (E, W))
+    strip = np.floor((points[:, 1] - middle) / (_STRIP * width)).astype(np.int64)
+    strip -= strip.min()
+    window = (points[:, 0] / NODES_A_WIDTH).astype(np.int64)
+    windows, strips = int(window.max()) + 1, int(strip.max()) + 1
+    psi = shares * distances / scale
+    place = window * strips + strip
+    sums, squares, counts = (
+        np.bincount(place, v, windows * strips).reshape(windows, strips) for v in (psi, psi * psi, np.ones(len(psi)))
+    )
+    told = (counts >= _FEW) & (squares > 0)
+    seen = np.where(told, sums**2 / np.where(told, squares, 1.0), 0.0).sum(axis=1)
+    free = np.maximum(told.sum(axis=1) - TERMS, 0.0)
+    seen = np.where(free > 0, seen, 0.0)
+    if seen.sum() < free.sum() + _SURE * np.sqrt(2.0 * free.sum()):
+        return np.ones(len(terms) - 1)
+    near = np.ones(min(_TOGETHER, windows))
+    found = np.convolve(seen, near, "same") / np.maximum(np.convolve(free, near, "same"), 1.0)
+    middles = (np.arange(len(terms) - 1) + 0.5) / NODES_A_WIDTH - 0.5
+    return np.maximum(np.interp(middles, np.arange(windows), found), 1.0)
 
 
 def inflation_of(matrix: Array, right: Array) -> float:

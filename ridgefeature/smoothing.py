@@ -18,7 +18,6 @@ Floats = NDArray[np.float64]
 
 ORDERS = (3, 2, 1, 3, 2, 2)
 """Order of the differences that are kept small, of each term: offsets follow a smooth curvature."""
-_ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +60,15 @@ def smoothest(
     n: int,
     wanted: Floats,
     weights: Floats,
+    rounds: int,
 ) -> Smooth:
     """The splines that the stretches' normal equations and the penalties ask for together.
 
     matrix (m, 6, 6), goal (m, 6): of m stretches, in units of the noise; places (m,) in knots; n:
     coefficients a term. wanted (6, n): what the differences should be, by rows as long as there are
-    differences. weights (6,): of the penalties, to begin with.
+    differences. weights (6,): of the penalties, to begin with, which become likelier with each round.
     """
     first, basis = basis_at(n, places)
     band, right = assembled(matrix, goal, first, basis, n)
-    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, _ROUNDS)
+    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, rounds)
     return Smooth(found, inverse, lam)

@@ -6,6 +6,8 @@ Marx 1996). Unknown 6 i + k is the i-th coefficient of the k-th term.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -68,24 +70,71 @@ def _steps(order: int) -> Floats:
 
 
 @njit(**OPTIONS)
-def _next_weight(
-    found: Floats, inverse: Floats, term: int, order: int, weight: float, wanted: Floats
-) -> float:
-    """The weight that makes differences left over as large as chance does (Wood and Fasiolo 2017)."""
-    n = found.size // TERMS
+def _differences(found: Floats, term: int, order: int, wanted: Floats) -> Floats:
+    """Differences (n - order,) of a term's coefficients, less what is wanted of them."""
     steps = _steps(order)
-    trace = rough = 0.0
-    for d in range(n - order):
-        left = -wanted[d]
+    left = -wanted[: found.size // TERMS - order]
+    for d in range(left.size):
         for k in range(order + 1):
-            left += steps[k] * found[TERMS * (d + k) + term]
+            left[d] += steps[k] * found[TERMS * (d + k) + term]
+    return left
+
+
+@njit(**OPTIONS)
+def _free(inverse: Floats, term: int, order: int, weight: float) -> float:
+    """Differences of a term that the data tell: all of them, less those that the penalty holds."""
+    rows = inverse.shape[0] // TERMS - order
+    steps = _steps(order)
+    trace = 0.0
+    for d in range(rows):
+        for k in range(order + 1):
             i = TERMS * (d + k) + term
             for m in range(k + 1):
                 twice = 1.0 if m == k else 2.0
                 trace += twice * steps[k] * steps[m] * inverse[i, TERMS * (k - m)]
-        rough += left * left
-    free = max(n - order - weight * trace, 1e-3)
-    return min(max(free / max(rough, 1e-300), 1e-3 * weight), 1e3 * weight)
+    return float(max(rows - weight * trace, 1e-3))
+
+
+@njit(**OPTIONS)
+def _next_weight(
+    found: Floats, inverse: Floats, term: int, order: int, weight: float, wanted: Floats
+) -> float:
+    """The weight that makes differences left over as large as chance does (Wood and Fasiolo 2017).
+
+    Never so large that nothing is free: what the data do not tell from a straight line need not be one. That
+    is a prior for the deviation of differences that is 0 at 0 (Chung et al. 2013: a gamma distribution of
+    shape 2 and no rate).
+    """
+    left = _differences(found, term, order, wanted)
+    rough = float((left * left).sum())
+    return weight * min(max(_free(inverse, term, order, weight) / (weight * rough + 1.0), 1e-3), 1e3)
+
+
+@njit(**OPTIONS)
+def _doubt(
+    factored: Floats, found: Floats, inverse: Floats, orders: Indices, lam: Floats, wanted: Floats
+) -> Floats:
+    """The band of the covariance that comes from not knowing the weights of the penalties (Kass and Steffey).
+
+    The standard deviation of a weight's logarithm is that of a variance that so many differences tell; each
+    of them is told in part only, which (0 < order) counts as 1 - 1 / (2 order) of them, as for the spectrum of
+    a smoothing spline.
+    """
+    n = found.size // TERMS
+    out = np.zeros_like(inverse)
+    for term in range(TERMS):
+        order = orders[term]
+        steps, left = _steps(order), _differences(found, term, order, wanted[term])
+        pull = np.zeros_like(found)
+        for d in range(left.size):
+            for k in range(order + 1):
+                pull[TERMS * (d + k) + term] += lam[term] * steps[k] * left[d]
+        told = max(_free(inverse, term, order, lam[term]), 1.0) * (1.0 - 0.5 / order)
+        moved = solve(factored, pull) * math.sqrt(2.0 / told)
+        for i in range(TERMS * n):
+            for k in range(min(_BAND - 1, i) + 1):
+                out[i, k] += moved[i] * moved[i - k]
+    return out
 
 
 @njit(**OPTIONS)
@@ -111,7 +160,7 @@ def most_likely(
         least[k] = _LEAST_RIDGE * size + 1e-300
         most[k] = _HARDEST * size + 1e-290
     lam = np.minimum(weights, most)
-    found, inverse = np.zeros(TERMS * n), np.zeros_like(band)
+    found, inverse, doubt = np.zeros(TERMS * n), np.zeros_like(band), np.zeros_like(band)
     for _ in range(rounds):
         whole, pull = band.copy(), right.copy()
         for k in range(TERMS):
@@ -124,9 +173,10 @@ def most_likely(
             continue
         found = solve(factored, pull)
         inverse = inverse_band(factored)
+        doubt = _doubt(factored, found, inverse, orders, lam, wanted)
         for k in range(TERMS):
             lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k]), most[k])
-    return found.reshape(n, TERMS), inverse, lam
+    return found.reshape(n, TERMS), inverse + doubt, lam
 
 
 @njit(**OPTIONS)
