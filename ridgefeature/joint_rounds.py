@@ -22,8 +22,7 @@ _STEEP = 0.4
 """Height by width from which on it matters how a fit begins."""
 _NEXT_MIXTURE = 3
 _ROUNDS, _LAST_ROUNDS = 2, 4
-"""In which weights of penalties become likelier; few of them as long as the terms are not known well: what was
-made straight then hardly bends again."""
+"""In which weights of penalties become likelier: few of them as long as the terms are not known well."""
 _TELLING = 5000
 """As many points tell how likely a state is."""
 
@@ -101,8 +100,10 @@ def improved(task: Task, points: Array, state: State | None, left: int, near: bo
     if state is None:
         return None
     path = task.path
-    told = EXACT * task.height, 2.0**left
-    found = _by_foot_points(points, state, *told) if near else _linearised(points, task.some, state, *told)
+    scales = EXACT * task.height, 2.0**left
+    found = (
+        _by_foot_points(points, state, *scales) if near else _linearised(points, task.some, state, *scales)
+    )
     matrix, goal, noise, gain, local = found
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
@@ -113,7 +114,9 @@ def improved(task: Task, points: Array, state: State | None, left: int, near: bo
     if task.flat:
         _fix(matrix, goal, C)
     middle = 0.5 * (path.knots[1:] + path.knots[:-1])
-    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, state.weights, _ROUNDS if left or near else _LAST_ROUNDS)
+    early = left > 0 or near
+    told = state.weights, _ROUNDS if early else _LAST_ROUNDS, not early
+    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, *told)
     first, basis = basis_at(path.coefficients, path.knots)
     terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
     if not np.isfinite(terms).all():

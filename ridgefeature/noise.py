@@ -25,7 +25,7 @@ _BESIDE = 0.7
 """Distance from the spine in widths up to which points are counted to tell how evenly they lie."""
 _SOME_STRAYS = 0.05
 _STRIP, _FEW, _TOGETHER = 0.1, 3, 3
-"""Breadth of strips in widths; fewest points in a part one width long; parts whose sums are looked at together."""
+"""Breadth of strips in widths; fewest points of a part one width long; such parts looked at together."""
 _SURE = 3.0
 """Standard deviations from which on such sums are correlated."""
 _BLOCK = 5
@@ -108,9 +108,9 @@ def _evenness(points: Array, terms: Array, section: Section, noise: float) -> fl
 def inflation_along(points: Array, terms: Array, distances: Array, shares: Array, scale: float) -> Array:
     """The same (n - 1,) of each stretch, by sums over narrow strips beside each other along the ridge.
 
-    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; distances (m,) from where points are
-    expected; shares (m,): chance that each is no stray. Points of one scan line may have an error in common:
-    where such lines run along the ridge their sums tell far less than so many points would.
+    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; distances (m,) from where points
+    are expected; shares (m,): chance that each is no stray. Points of one scan line may have an error in
+    common: where such lines run along the ridge their sums tell far less than so many points would.
     """
     nodes = np.arange(len(terms))
     middle, width = (np.interp(points[:, 0], nodes, terms[:, k]) for k in (E, W))
@@ -121,7 +121,8 @@ def inflation_along(points: Array, terms: Array, distances: Array, shares: Array
     psi = shares * distances / scale
     place = window * strips + strip
     sums, squares, counts = (
-        np.bincount(place, v, windows * strips).reshape(windows, strips) for v in (psi, psi * psi, np.ones(len(psi)))
+        np.bincount(place, v, windows * strips).reshape(windows, strips)
+        for v in (psi, psi * psi, np.ones(len(psi)))
     )
     told = (counts >= _FEW) & (squares > 0)
     seen = np.where(told, sums**2 / np.where(told, squares, 1.0), 0.0).sum(axis=1)

@@ -61,14 +61,16 @@ def smoothest(
     wanted: Floats,
     weights: Floats,
     rounds: int,
+    doubted: bool,
 ) -> Smooth:
     """The splines that the stretches' normal equations and the penalties ask for together.
 
     matrix (m, 6, 6), goal (m, 6): of m stretches, in units of the noise; places (m,) in knots; n:
     coefficients a term. wanted (6, n): what the differences should be, by rows as long as there are
     differences. weights (6,): of the penalties, to begin with, which become likelier with each round.
+    doubted: whether what the data do not tell from a straight line need not be one.
     """
     first, basis = basis_at(n, places)
     band, right = assembled(matrix, goal, first, basis, n)
-    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, rounds)
+    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, rounds, float(doubted))
     return Smooth(found, inverse, lam)

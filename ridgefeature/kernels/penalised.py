@@ -97,17 +97,19 @@ def _free(inverse: Floats, term: int, order: int, weight: float) -> float:
 
 @njit(**OPTIONS)
 def _next_weight(
-    found: Floats, inverse: Floats, term: int, order: int, weight: float, wanted: Floats
+    found: Floats, inverse: Floats, term: int, order: int, weight: float, wanted: Floats, doubted: float
 ) -> float:
     """The weight that makes differences left over as large as chance does (Wood and Fasiolo 2017).
 
-    Never so large that nothing is free: what the data do not tell from a straight line need not be one. That
-    is a prior for the deviation of differences that is 0 at 0 (Chung et al. 2013: a gamma distribution of
-    shape 2 and no rate).
+    doubted: 1 if it is never so large that nothing is free: what the data do not tell from a straight line
+    need not be one. That is a prior for the deviation of differences that is 0 at 0 (Chung et al. 2013: a
+    gamma distribution of shape 2 and no rate). 0: without.
     """
     left = _differences(found, term, order, wanted)
     rough = float((left * left).sum())
-    return weight * min(max(_free(inverse, term, order, weight) / (weight * rough + 1.0), 1e-3), 1e3)
+    return weight * min(
+        max(_free(inverse, term, order, weight) / max(weight * rough + doubted, 1e-300), 1e-3), 1e3
+    )
 
 
 @njit(**OPTIONS)
@@ -117,8 +119,8 @@ def _doubt(
     """The band of the covariance that comes from not knowing the weights of the penalties (Kass and Steffey).
 
     The standard deviation of a weight's logarithm is that of a variance that so many differences tell; each
-    of them is told in part only, which (0 < order) counts as 1 - 1 / (2 order) of them, as for the spectrum of
-    a smoothing spline.
+    of them is told in part only, which counts as 1 - 1 / (2 order) of them, as for the spectrum of a smoothing
+    spline.
     """
     n = found.size // TERMS
     out = np.zeros_like(inverse)
@@ -145,11 +147,12 @@ def most_likely(
     wanted: Floats,
     weights: Floats,
     rounds: int,
+    doubted: float = 1.0,
 ) -> tuple[Floats, Floats, Floats]:
     """Coefficients (n, 6), band of their covariance (6 n, 24) and weights (6,), most likely together.
 
     wanted (6, n): of the differences of each term; weights: to begin with. There are always as many
-    rounds: stopping early would let rounding decide on the result.
+    rounds: stopping early would let rounding decide on the result. doubted: as for `_next_weight`.
     """
     n = band.shape[0] // TERMS
     most, least = np.zeros(TERMS), np.zeros(TERMS)
@@ -175,7 +178,7 @@ def most_likely(
         inverse = inverse_band(factored)
         doubt = _doubt(factored, found, inverse, orders, lam, wanted)
         for k in range(TERMS):
-            lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k]), most[k])
+            lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k], doubted), most[k])
     return found.reshape(n, TERMS), inverse + doubt, lam
 
 
