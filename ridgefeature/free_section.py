@@ -19,7 +19,7 @@ from ridgefeature.unseen import unseen_std
 
 Array = NDArray[np.float64]
 
-SPANS = 28
+SPANS = 40
 """Of the free spline, over WIDER widths."""
 WIDER = 1.25
 FREE = "free"

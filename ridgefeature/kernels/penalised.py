@@ -119,8 +119,8 @@ def _doubt(
     """The band of the covariance that comes from not knowing the weights of the penalties (Kass and Steffey).
 
     The standard deviation of a weight's logarithm is that of a variance that so many differences tell; each
-    of them is told in part only, which counts as 1 - 1 / (2 order) of them, as for the spectrum of a smoothing
-    spline.
+    of them is told in part only, which counts as 1 - 1 / (2 order) of them, as for the spectrum of a
+    smoothing spline.
     """
     n = found.size // TERMS
     out = np.zeros_like(inverse)
