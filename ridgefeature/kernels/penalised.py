@@ -6,8 +6,6 @@ Marx 1996). Unknown 6 i + k is the i-th coefficient of the k-th term.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -113,33 +111,6 @@ def _next_weight(
 
 
 @njit(**OPTIONS)
-def _doubt(
-    factored: Floats, found: Floats, inverse: Floats, orders: Indices, lam: Floats, wanted: Floats
-) -> Floats:
-    """The band of the covariance that comes from not knowing the weights of the penalties (Kass and Steffey).
-
-    The standard deviation of a weight's logarithm is that of a variance that so many differences tell; each
-    of them is told in part only, which counts as 1 - 1 / (2 order) of them, as for the spectrum of a
-    smoothing spline.
-    """
-    n = found.size // TERMS
-    out = np.zeros_like(inverse)
-    for term in range(TERMS):
-        order = orders[term]
-        steps, left = _steps(order), _differences(found, term, order, wanted[term])
-        pull = np.zeros_like(found)
-        for d in range(left.size):
-            for k in range(order + 1):
-                pull[TERMS * (d + k) + term] += lam[term] * steps[k] * left[d]
-        told = max(_free(inverse, term, order, lam[term]), 1.0) * (1.0 - 0.5 / order)
-        moved = solve(factored, pull) * math.sqrt(2.0 / told)
-        for i in range(TERMS * n):
-            for k in range(min(_BAND - 1, i) + 1):
-                out[i, k] += moved[i] * moved[i - k]
-    return out
-
-
-@njit(**OPTIONS)
 def most_likely(
     band: Floats,
     right: Floats,
@@ -163,7 +134,7 @@ def most_likely(
         least[k] = _LEAST_RIDGE * size + 1e-300
         most[k] = _HARDEST * size + 1e-290
     lam = np.minimum(weights, most)
-    found, inverse, doubt = np.zeros(TERMS * n), np.zeros_like(band), np.zeros_like(band)
+    found, inverse = np.zeros(TERMS * n), np.zeros_like(band)
     for _ in range(rounds):
         whole, pull = band.copy(), right.copy()
         for k in range(TERMS):
@@ -176,10 +147,9 @@ def most_likely(
             continue
         found = solve(factored, pull)
         inverse = inverse_band(factored)
-        doubt = _doubt(factored, found, inverse, orders, lam, wanted)
         for k in range(TERMS):
             lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k], doubted), most[k])
-    return found.reshape(n, TERMS), inverse + doubt, lam
+    return found.reshape(n, TERMS), inverse, lam
 
 
 @njit(**OPTIONS)
