@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 _COLOURS = "viridis"
 _PICK = "#e11d48"
 _SIZE = (1700, 1000)
+_ROOM = 6
+"""Pixels between a text and the side of its picture."""
 
 
 def view(scan: Scan | ArrayLike, ridge: Ridge, path: str | os.PathLike[str]) -> Figure:
@@ -147,7 +149,7 @@ def _mark(axes: Any, ridge: Ridge, eye: Camera) -> None:
         # Off the end of the ridge, unless the text would leave the picture there.
         right = out[0] >= 0 if abs(top[end][0]) < 0.7 * eye.half_width else top[end][0] < 0
         up = out[1] >= 0 if abs(top[end][1]) < 0.85 * eye.half_height else top[end][1] < 0
-        axes.annotate(
+        words = axes.annotate(
             label,
             top[end],
             xytext=(12 if right else -12, 12 if up else -12),
@@ -159,7 +161,18 @@ def _mark(axes: Any, ridge: Ridge, eye: Camera) -> None:
             path_effects=halo,
             zorder=9,
         )
+        _keep_inside(axes, words)
     axes.plot(*eye.project(ridge.pick), "*", ms=17, mfc=_PICK, mec="white", mew=1.2, zorder=8)
+
+
+def _keep_inside(axes: Any, words: Any) -> None:
+    """Move an annotation whose text would be cut off at a side of the picture."""
+    box, room = words.get_window_extent(axes.figure.canvas.get_renderer()), axes.get_window_extent()
+    x, y = words.xyann
+    points = 72 / axes.figure.dpi
+    x += points * (max(room.x0 + _ROOM - box.x0, 0.0) + min(room.x1 - _ROOM - box.x1, 0.0))
+    y += points * (max(room.y0 + _ROOM - box.y0, 0.0) + min(room.y1 - _ROOM - box.y1, 0.0))
+    words.xyann = x, y
 
 
 def _scale_bar(axes: Any, eye: Camera, unit: str) -> None:

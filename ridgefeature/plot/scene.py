@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvilinear import local_coordinates, templates_on
 from ridgefeature.plot.camera import Camera
-from ridgefeature.plot.collapse import local_coordinates, outline, thinned
+from ridgefeature.plot.marks import outline, thinned
 from ridgefeature.ridge import Ridge
 
 Array = NDArray[np.float64]
@@ -58,9 +59,17 @@ def build(ridge: Ridge, points: Array) -> Scene:
         normals,
         ridge.section(np.linspace(*surface.domain[1], _ACROSS)),
         ridge.spine + ridge.height[:, None] * ridge.normal,
-        [outline(t) for t in ridge.templates],
+        _outlines(ridge),
         float(np.median([t.scale for t in ridge.templates])),
     )
+
+
+def _outlines(ridge: Ridge) -> list[Array]:
+    """Of the templates that are part of the finished ridge, cut off at its ends."""
+    templates, places = templates_on(ridge)
+    if ridge.closed:
+        return [outline(t) for t in templates]
+    return [outline(t, s, ridge.length - s) for t, s in zip(templates, places, strict=True)]
 
 
 def _around(points: Array, grid: Array) -> Array:
