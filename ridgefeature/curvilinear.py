@@ -56,6 +56,14 @@ def templates_on(ridge: Ridge) -> tuple[tuple[Template, ...], Array]:
     return tuple(ridge.templates[i] for i in on), s[on]
 
 
+def crest(ridge: Ridge) -> Array:
+    """(k, 3) the line of the apexes: of a section that leans, aside of the spine."""
+    eta = np.linspace(-0.5, 0.5, 1001)
+    height = ridge.section(eta)
+    apex = float(eta[height >= height.max() * (1 - 1e-6)].mean())
+    return np.asarray(ridge.surface()(ridge.arc_length, apex))
+
+
 def _nearest(places: Array, points: Array) -> NDArray[np.intp]:
     """Index (n,) of the nearest of the places (k, 3) to each point (n, 3)."""
     middle = places.mean(axis=0)

@@ -12,7 +12,7 @@ import pytest
 
 import ridgefeature as rf
 from ridgefeature import plot
-from ridgefeature.curvilinear import local_coordinates, templates_on
+from ridgefeature.curvilinear import crest, local_coordinates, templates_on
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.plot import camera, scene
 from ridgefeature.plot.marks import outline, thinned
@@ -170,6 +170,17 @@ def test_outline_lies_on_its_template(ridge: rf.Ridge) -> None:
     assert np.ptp(line[:, 0]) == pytest.approx(template.length)
 
 
+def test_the_crest_of_a_leaning_section_lies_aside_of_the_spine(ridge: rf.Ridge) -> None:
+    top = ridge.spine + ridge.height[:, None] * ridge.normal
+    np.testing.assert_allclose(crest(ridge), top, atol=0.01)
+    leaning = rf.Section(np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 0.8, 0.1]), "leaning")
+    lines = crest(replace(ridge, section=leaning))
+    aside = ((lines - top) * ridge.across).sum(axis=1) / ridge.width
+    np.testing.assert_allclose(aside, 2 / 12, atol=0.03)
+    heights = ((lines - ridge.spine) * ridge.normal).sum(axis=1)
+    np.testing.assert_allclose(heights, ridge.height, rtol=0.01)
+
+
 def test_an_outline_is_cut_off_where_the_ridge_ends(ridge: rf.Ridge) -> None:
     template = ridge.templates[3]
     line = (outline(template, back=0.1 * template.length) - template.position) @ template.rotation
@@ -227,7 +238,7 @@ def _shows_ridge(path: Path, ridge: rf.Ridge, scan: rf.Scan) -> None:
         assert any(words.startswith("end, s = ") for words in said)
     assert orange[1] > 0.05 > orange[0]
     legend = {text.get_text().split()[0] for text in figure.legends[0].get_texts()}
-    assert legend == {"scan", "templates", "ridge", "spine", "pick"}
+    assert legend == {"scan", "templates", "ridge", "crest", "pick"}
 
 
 def test_view_by_vtk(

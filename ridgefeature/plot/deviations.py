@@ -107,7 +107,14 @@ def _map(figure: Figure, axes: Any, ridge: Ridge, found: Diagnosis) -> None:
 
 def _distances(axes: Any, ridge: Ridge, found: Diagnosis) -> None:
     """How far points lie off, between the feet, against the noise."""
-    axes.stairs(found.stretch_rms, found.stretches, color=_LINE, lw=1.8, label="all points between the feet")
+    axes.stairs(
+        found.stretch_rms,
+        found.stretches,
+        color=_LINE,
+        lw=1.8,
+        label="all points between the feet",
+        baseline=None,
+    )
     axes.axhline(found.noise, color=_LINE, ls="--", lw=1, label="noise level")
     _by_status(axes, found, lambda t: t.deviation_rms, "no strays, along one template")
     values = [*found.stretch_rms, *(t.deviation_rms for t in found.templates), found.noise]
@@ -120,8 +127,10 @@ def _distances(axes: Any, ridge: Ridge, found: Diagnosis) -> None:
 
 def _shares(axes: Any, found: Diagnosis) -> None:
     """What part of the surface was seen, and what part of the points are strays or inliers."""
-    axes.stairs(found.stretch_coverage, found.stretches, color=_SEEN, lw=1.8, label="surface seen")
-    axes.stairs(found.stretch_outliers, found.stretches, color=_OTHER, lw=1.8, label="strays")
+    axes.stairs(
+        found.stretch_coverage, found.stretches, color=_SEEN, lw=1.8, label="surface seen", baseline=None
+    )
+    axes.stairs(found.stretch_outliers, found.stretches, color=_OTHER, lw=1.8, label="strays", baseline=None)
     _by_status(axes, found, lambda t: t.inliers / t.points if t.points else np.nan, "inliers of one template")
     axes.set(ylim=(-0.04, 1.45), yticks=[0, 0.5, 1], ylabel="share between\nthe feet")
     _finish(axes)
