@@ -178,7 +178,7 @@ def test_export_by_suffix_and_rates(feature: Path, tmp_path: Path) -> None:
     assert tops[2] == pytest.approx(tops[1], rel=1e-3)
     assert run("export", feature, "-o", tmp_path / "d.stl").exit_code == 0
     assert rf.read_scan(tmp_path / "d.stl", vertices=True).bounds[1, 2] == pytest.approx(tops[0], rel=0.05)
-    assert len(list(tmp_path.iterdir())) == 5
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_export_of_a_scan_in_metres_is_in_millimetres(tmp_path: Path) -> None:
