@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _BLOCK = 20_000
+_TOP = 0.9
+"""Height, in that of the apex, from which on a place is on the crest: the apex of a flat top is anywhere."""
 _ASIDE = 0.5
 """Distance from the spine, in widths between the feet, up to which a template's centre is on the path."""
 
@@ -57,11 +59,10 @@ def templates_on(ridge: Ridge) -> tuple[tuple[Template, ...], Array]:
 
 
 def crest(ridge: Ridge) -> Array:
-    """(k, 3) the line of the apexes: of a section that leans, aside of the spine."""
+    """(k, 3) the middle of the highest tenth of each section: aside of the spine, where the section leans."""
     eta = np.linspace(-0.5, 0.5, 1001)
-    height = ridge.section(eta)
-    apex = float(eta[height >= height.max() * (1 - 1e-6)].mean())
-    return np.asarray(ridge.surface()(ridge.arc_length, apex))
+    top = eta[ridge.section(eta) >= _TOP]
+    return np.asarray(ridge.surface()(ridge.arc_length, 0.5 * float(top[0] + top[-1])))
 
 
 def _nearest(places: Array, points: Array) -> NDArray[np.intp]:

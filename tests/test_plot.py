@@ -176,9 +176,9 @@ def test_the_crest_of_a_leaning_section_lies_aside_of_the_spine(ridge: rf.Ridge)
     leaning = rf.Section(np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 0.8, 0.1]), "leaning")
     lines = crest(replace(ridge, section=leaning))
     aside = ((lines - top) * ridge.across).sum(axis=1) / ridge.width
-    np.testing.assert_allclose(aside, 2 / 12, atol=0.03)
+    assert (np.abs(aside - 2 / 12) < 0.02).all(), "its largest control point is the second beyond the middle"
     heights = ((lines - ridge.spine) * ridge.normal).sum(axis=1)
-    np.testing.assert_allclose(heights, ridge.height, rtol=0.01)
+    assert (heights > 0.95 * ridge.height).all() and (heights < 1.001 * ridge.height).all()
 
 
 def test_an_outline_is_cut_off_where_the_ridge_ends(ridge: rf.Ridge) -> None:
