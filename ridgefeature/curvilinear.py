@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
+T = TypeVar("T", bound=np.generic)
 
 _BLOCK = 20_000
 _TOP = 0.9
@@ -63,6 +64,13 @@ def crest(ridge: Ridge) -> Array:
     eta = np.linspace(-0.5, 0.5, 1001)
     top = eta[ridge.section(eta) >= _TOP]
     return np.asarray(ridge.surface()(ridge.arc_length, 0.5 * float(top[0] + top[-1])))
+
+
+def thinned(points: NDArray[T], most: int) -> NDArray[T]:
+    """At most that many of the points, chosen at random (scans come in rows, which even steps would show)."""
+    if len(points) <= most:
+        return points
+    return points[np.sort(np.random.default_rng(0).choice(len(points), most, replace=False))]
 
 
 def _nearest(places: Array, points: Array) -> NDArray[np.intp]:

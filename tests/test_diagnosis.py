@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import ridgefeature as rf
-from ridgefeature import plot
+from ridgefeature import diagnosis, plot
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.readable import rows
 from ridgefeature.synthetic import Spiral
@@ -133,6 +133,17 @@ def test_it_does_not_depend_on_order_place_or_unit(
     assert there.reduced_chi_square == pytest.approx(found.reduced_chi_square, rel=0.02)
     assert there.coverage == pytest.approx(found.coverage, abs=1e-3)
     assert len(there.templates) == len(found.templates)
+
+
+def test_of_very_many_points_some_tell_the_same(
+    ridge: rf.Ridge, points: Array, found: rf.Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnosis, "MOST", 5000)
+    some, again = rf.diagnose(ridge, points), rf.diagnose(ridge, points)
+    assert 1000 < len(some.deviation) < 0.5 * len(found.deviation)
+    assert some.noise == pytest.approx(found.noise, rel=0.08)
+    assert some.coverage > 0.99 and some.doubts == ()
+    np.testing.assert_array_equal(some.deviation, again.deviation)
 
 
 @pytest.mark.parametrize("scan", [np.full((20, 3), 1e5), np.array([[30.0, 0, 5]])])

@@ -12,10 +12,10 @@ import pytest
 
 import ridgefeature as rf
 from ridgefeature import plot
-from ridgefeature.curvilinear import crest, local_coordinates, templates_on
+from ridgefeature.curvilinear import crest, local_coordinates, templates_on, thinned
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.plot import camera, scene
-from ridgefeature.plot.marks import outline, thinned
+from ridgefeature.plot.marks import outline
 from ridgefeature.readable import number
 from ridgefeature.section import plateau
 from ridgefeature.synthetic import Spiral
@@ -256,7 +256,7 @@ def test_view_without_vtk(
     _shows_ridge(tmp_path / "v.png", ridge, scan)
 
 
-@pytest.mark.parametrize("turns", range(8))
+@pytest.mark.parametrize("turns", range(0, 8, 2))
 def test_labels_of_a_ring_lie_inside_their_picture(turns: int, tmp_path: Path) -> None:
     """Wherever on the ring arc length begins."""
     angle = np.linspace(0, 2 * np.pi, 81) + turns * np.pi / 4

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.curvilinear import local_coordinates, templates_on
+from ridgefeature.curvilinear import local_coordinates, templates_on, thinned
 from ridgefeature.plot.files import new_figure, save
-from ridgefeature.plot.marks import thinned
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ridgefeature.curvilinear import thinned
 from ridgefeature.diagnosis import Diagnosis, TemplateFit, diagnose
 from ridgefeature.plot.files import new_figure, save
-from ridgefeature.plot.marks import thinned
 from ridgefeature.readable import rows
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvilinear import crest, local_coordinates, templates_on
+from ridgefeature.curvilinear import crest, local_coordinates, templates_on, thinned
 from ridgefeature.plot.camera import Camera
-from ridgefeature.plot.marks import outline, thinned
+from ridgefeature.plot.marks import outline
 from ridgefeature.ridge import Ridge
 
 Array = NDArray[np.float64]
