@@ -18,7 +18,7 @@ from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from cad_export.carried import faces_of, record_of
+from cad_export.carried import carried_by, faces_of, record_of
 from cad_export.check import subshapes
 from cad_export.face_base import FaceBase, face_base, vector
 from cad_export.geometry import topods
@@ -236,12 +236,24 @@ def _face_of(solid: TopoDS_Shape, face: Any, path: Any, at: ArrayLike | None) ->
     faces = faces_of(solid)
     if path is not None or at is not None:
         goal = _vertex(at) if path is None else topods(path)
-        return min(faces, key=lambda f: BRepExtrema_DistShapeShape(goal, f).Value())
+        nearest = min(faces, key=lambda f: BRepExtrema_DistShapeShape(goal, f).Value())
+        _check_free(solid, nearest, "at" if path is None else "path")
+        return nearest
     areas = [cq.Face(f).Area() for f in faces]
     largest = max(areas)
     if sum(a > (1 - 1e-6) * largest for a in areas) > 1:
         raise ValueError("face: the host has several largest faces; give face=, at= or path=")
     return faces[areas.index(largest)]
+
+
+def _check_free(solid: TopoDS_Shape, face: TopoDS_Face, place: str) -> None:
+    """Raise ValueError where the face that was found is that of a ridge: nobody asked for a ridge on it."""
+    for other, record in carried_by(solid):
+        if other.IsSame(face):
+            raise ValueError(
+                f"{place}: expected a place clear of ridges pasted before, {record.name!r} is there; give "
+                "another place, face= to set this ridge on that one, or paste on the host as it was before"
+            )
 
 
 def _vertex(at: ArrayLike | None) -> TopoDS_Shape:

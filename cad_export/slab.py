@@ -18,8 +18,13 @@ from OCP.TopoDS import TopoDS, TopoDS_Solid
 
 from cad_export.check import check_solid
 from cad_export.geometry import DEGENERATE, make_face
+from cad_export.mesh_crossings import crosses_itself, welded
 from ridgefeature.bspline import Surface, basis_matrix, greville, interpolate
 
+_SAMPLES = (200, 40)
+"""Most samples along and across in which faces that cross are looked for."""
+_BISECTIONS = 6
+"""Thicknesses tried to tell one that goes."""
 _ACROSS = np.array([0.0, 0.0, 1.0, 1.0])  # knots of a ruled side from border to border
 
 
@@ -27,16 +32,19 @@ def make_slab(top: Surface, base: Surface, thickness: float, check: bool = True)
     """The solid from `top` down to a lower face `thickness` below `base`, each row along its own normal.
 
     `base` has the knots of `top`; down is against its normal du x dv. Lengths in the surface's unit. With
-    check=False the search for faces that cross each other is left out. Raises ValueError when the thickness
-    is not positive, the lower face folds or the top runs through it, or the solid fails its checks.
+    check=False the search for faces that cross each other, on samples, is left out. Raises ValueError when
+    the thickness is not positive, the lower face folds or the top runs through it, each with the thickness
+    that goes, or the solid fails its checks.
     """
     if not (np.isfinite(thickness) and thickness > 0):
         raise ValueError(f"expected a thickness above 0, got {thickness!r}; the slab lies below the surface")
     if not (np.array_equal(top.knots_u, base.knots_u) and np.array_equal(top.knots_v, base.knots_v)):
         raise ValueError("expected a base with the knots of the surface; make both from the same stations")
     up = _up(base)
+    _check_thickness(thickness, *thickness_range(top, base))
     low = replace(base, poles=base.poles - thickness * up[:, None])
-    _check_gap(top, low, up, thickness)
+    if check:
+        _check_crossings(top, base, up, thickness)
     sides = _sides(top, low)
     volume = top.flux() - low.flux() + sum(side.flux() for side in sides)
     sewing = BRepBuilderAPI_Sewing(DEGENERATE * 10)
@@ -57,7 +65,7 @@ def make_slab(top: Surface, base: Surface, thickness: float, check: bool = True)
         solid.Orientation() == TopAbs_REVERSED
     ):  # turn the shell instead: some readers drop a solid's orientation
         solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(shell.Reversed())).Solid()
-    check_solid(solid, volume, crossings=check)
+    check_solid(solid, volume, crossings=False)
     return solid
 
 
@@ -77,22 +85,91 @@ def _up(base: Surface) -> NDArray[np.float64]:
     return interpolate(base.knots_u, base.degree_u, rows / length)
 
 
-def _check_gap(top: Surface, low: Surface, up: NDArray[np.float64], thickness: float) -> None:
-    """Raise ValueError where the lower face folds over or reaches the top, on four samples a span."""
-    (u0, u1), (v0, v1) = top.domain
+def thickness_range(top: Surface, base: Surface) -> tuple[float, float, float]:
+    """Above which thickness the top is clear of the lower face, below which that does not fold, and where.
+
+    The lower face is base - t up(u), so both are linear in t at every place: four samples a span tell them.
+    The last value is the parameter u of the place that folds first.
+    """
+    (u0, u1), (v0, v1) = base.domain
     inside = 1e-6 * (u1 - u0)
-    u = np.linspace(u0 + inside, u1 - inside, 4 * top.poles.shape[0])
-    v = np.linspace(v0, v1, 4 * top.poles.shape[1])
-    rows = basis_matrix(top.knots_u, top.degree_u, u) @ up
-    gap = np.einsum("mkd,md->mk", top.on_grid(u, v) - low.on_grid(u, v), rows).min()
-    if gap <= 0:
+    u = np.linspace(u0 + inside, u1 - inside, 4 * base.poles.shape[0])
+    v = np.linspace(v0, v1, 4 * base.poles.shape[1])
+    up = _up(base)
+    rows, turn = (basis_matrix(base.knots_u, base.degree_u, u, order) @ up for order in (0, 1))
+    depth = -float(np.einsum("mkd,md->mk", top.on_grid(u, v) - base.on_grid(u, v), rows).min())
+    along, across = base.on_grid(u, v, (1, 0)), base.on_grid(u, v, (0, 1))
+    area = np.einsum("mkd,md->mk", np.cross(along, across), rows)
+    loss = np.einsum("mkd,md->mk", np.cross(turn[:, None], across), rows)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        folds = np.where(loss > 0, area / loss, np.where(area > 0, np.inf, 0.0)).min(axis=1)
+    return max(0.0, depth), float(folds.min()), float(u[folds.argmin()])
+
+
+def _check_thickness(thickness: float, least: float, most: float, where: float) -> None:
+    """Raise ValueError unless the thickness is within its range."""
+    if least < thickness < most:
+        return
+    shorter = 'take a stretch of the ridge by ridge.stretched(length, "trim")'
+    place = f"at arc length {where:.3f}"
+    if most <= 0:
         raise ValueError(
-            f"expected a thickness above {thickness - gap:.4g}, the depth of the surface, got {thickness:g}"
+            f"expected a base that does not fold, got one that does {place}, where the path bends more "
+            f"sharply than the flanks are broad: no thickness goes; {shorter}, or register with a smaller "
+            "border"
         )
-    if np.einsum("mkd,md->mk", low.normal(u[:, None], v), rows).min() <= 0:
+    if most <= least:
         raise ValueError(
-            f"expected a thickness below the base's radius of curvature, got {thickness:g}; go thinner"
+            f"thickness: none goes: expected one above {least:.4g}, the depth of the surface, and below "
+            f"{most:.4g}, the base's radius of curvature {place}; {shorter}, or an h nearer to 0"
         )
+    most = most * (1 - 1e-3)
+    if thickness <= least:
+        below = f" and below {most:.4g}" if np.isfinite(most) else ""
+        raise ValueError(
+            f"expected a thickness above {least:.4g}, the depth of the surface{below}, got {thickness:g}"
+        )
+    raise ValueError(
+        f"expected a thickness of at most {most:.4g}, within the base's radius of curvature {place}, got "
+        f"{thickness:g}; go thinner, or {shorter}"
+    )
+
+
+def _check_crossings(top: Surface, base: Surface, up: NDArray[np.float64], thickness: float) -> None:
+    """Raise ValueError where the slab runs through itself, with the largest thickness found that does not."""
+
+    def crosses(t: float) -> bool:
+        return crosses_itself(*_mesh(top, replace(base, poles=base.poles - t * up[:, None])))
+
+    if not crosses(thickness):
+        return
+    good, bad = thickness_range(top, base)[0], thickness
+    lowest = good
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (good + bad)
+        good, bad = (good, middle) if crosses(middle) else (middle, bad)
+    which = f"one of at most {good:.4g} has none" if good > lowest else "thinner ones have some too"
+    raise ValueError(
+        f"expected a solid without self-intersections, got a thickness of {thickness:g}; {which}, or take a "
+        'stretch of the ridge by ridge.stretched(length, "trim")'
+    )
+
+
+def _mesh(top: Surface, low: Surface) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and triangles of the slab: up to two samples a span, on its sides about as high as long."""
+    (u0, u1), (v0, v1) = top.domain
+    rows, columns = (min(2 * n, most) for n, most in zip(top.poles.shape, _SAMPLES, strict=False))
+    u, v = np.linspace(u0, u1, rows), np.linspace(v0, v1, columns)
+    above, below = top.on_grid(u, v), low.on_grid(u, v)
+    broad = float(np.median(np.linalg.norm(np.diff(above, axis=0), axis=-1)))
+    high = float(np.linalg.norm(above[:, 0] - below[:, 0], axis=-1).max())
+    part = np.linspace(0, 1, int(np.clip(high / max(broad, 1e-300), 1, 40)) + 1)[:, None, None]
+    sides = []
+    if not top.closed[0]:
+        sides += [above[None, i] * (1 - part) + below[None, i] * part for i in (0, -1)]
+    if not top.closed[1]:
+        sides += [above[None, :, k] * (1 - part) + below[None, :, k] * part for k in (0, -1)]
+    return welded([above, below, *sides])
 
 
 def _sides(top: Surface, low: Surface) -> list[Surface]:

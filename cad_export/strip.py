@@ -203,7 +203,8 @@ def check_inside(strip: Samples, host: Host) -> None:
     where = np.round(p, 4).tolist()
     advice = "move it by at= or path=, turn it by direction=, or use a smaller ridge"
     if hole:
-        raise ValueError(f"expected a strip clear of the face's holes, it meets one near {where}; {advice}")
+        clear = "clear of the face's holes and of ridges pasted before"
+        raise ValueError(f"expected a strip {clear}, it meets one near {where}; {advice}")
     raise OffFaceError(f"expected a strip inside the face, it leaves the face near {where}; {advice}")
 
 

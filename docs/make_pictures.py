@@ -60,8 +60,10 @@ def mountains() -> None:
         folder = Path(name)
         plot.view(scan, ridge, folder / "view.png")
         plot.profile(ridge, folder / "profile.png", scan)
+        plot.deviation(scan, ridge, folder / "deviation.png")
         shrink(folder / "view.png", FOLDER / "view.png", 1300, 256)
         shrink(folder / "profile.png", FOLDER / "profile.png", 1200, 128)
+        shrink(folder / "deviation.png", FOLDER / "deviation.png", 1200, 128)
 
 
 if __name__ == "__main__":

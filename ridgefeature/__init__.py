@@ -6,6 +6,7 @@ Example:
 """
 
 from ridgefeature.bspline import Surface
+from ridgefeature.diagnosis import Diagnosis, diagnose
 from ridgefeature.distance import directed_hausdorff, hausdorff, mean_directed_hausdorff
 from ridgefeature.io import load, read_scan
 from ridgefeature.registration import NoRidgeError, register
@@ -18,6 +19,7 @@ from ridgefeature.template import Template
 __version__ = "0.1.0"
 
 __all__ = [
+    "Diagnosis",
     "NoRidgeError",
     "Ridge",
     "Scan",
@@ -25,6 +27,7 @@ __all__ = [
     "Settings",
     "Surface",
     "Template",
+    "diagnose",
     "directed_hausdorff",
     "hausdorff",
     "load",

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from ridgefeature.improve import FEWEST_POINTS
+from ridgefeature.improve import FEWEST_POINTS, LEAST_CONTRAST
 from ridgefeature.kernels.alternatives import advantage
 from ridgefeature.kernels.base import on_base
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
-
-_LEAST_CONTRAST = 0.05
-"""Least noise scale, in parts of the height: misfit of the section is no evidence for another surface."""
 
 
 def distinct(window: Window, template: Template, settings: Settings) -> float:
@@ -18,7 +15,8 @@ def distinct(window: Window, template: Template, settings: Settings) -> float:
     points = window(template)
     if len(points) < FEWEST_POINTS or template.height == 0:
         return 0.0
-    scale = max(template.scale, _LEAST_CONTRAST * abs(template.height))
+    # Misfit of the section is no evidence for another surface.
+    scale = max(template.scale, LEAST_CONTRAST * abs(template.height))
     size = 0.5 * template.length, template.half_breadth, scale, settings.tuning
     views = [points]
     if template.base.any():

@@ -77,13 +77,14 @@ def demo(folder: Path) -> int:
     help="Folder for the files; those of the same names there are replaced.",
 )
 @click.option("--no-step", is_flag=True, help="Write no ridge.step.")
-@click.option("--no-pictures", is_flag=True, help="Write no profile.png and view.png.")
+@click.option("--no-pictures", is_flag=True, help="Write no profile.png, view.png and deviation.png.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def register(**options: Any) -> int:
     """Register the ridge in SCAN under the picked point.
 
-    Writes feature.ridge.json, ridge.step, profile.png (height and width along the ridge) and view.png to DIR.
-    Lengths are in the scan's unit. Ctrl-C ends the march and keeps what is there.
+    Writes feature.ridge.json, ridge.step, profile.png (height and width along the ridge), view.png and
+    deviation.png (where to trust it) to DIR. Lengths are in the scan's unit. Ctrl-C ends the march and keeps
+    what is there.
     """
     from ridgefeature.commands.register import run
 

@@ -1,14 +1,15 @@
-"""Ridges fitted to another path: of another length, mirrored, or joined to a ring."""
+"""Ridges fitted to another path: of another length, mirrored, or joined to a ring; widths that fit."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.merge import along
+from ridgefeature.merge import LEAST_BORDER, along
 from ridgefeature.section import Section
 from ridgefeature.stations import unit
 
@@ -105,3 +106,31 @@ def joined(ridge: Ridge) -> Ridge:
         new[-1] = new[0]
         changes[name] = new
     return replace(ridge, closed=True, **changes)
+
+
+def check_widths(ridge: Ridge, width: Array, rate: float | None, blend: Array) -> None:
+    """Raise ValueError unless these widths (k,) are above 0 and within the flanks.
+
+    rate: that was asked for, None of absolute widths; blend (k,): its share at each station. What is allowed
+    is told in what was asked for.
+    """
+    name = "width" if rate is None else "w"
+    if not (width > 0).all():
+        got, which = (width.min(), "values above 0 everywhere") if rate is None else (rate, "a rate above 0")
+        raise ValueError(f"{name}: expected {which}, got {got:g}; use a larger {name}")
+    room = ridge.border / LEAST_BORDER
+    i = int(np.argmax(width / room))
+    if width[i] <= room[i]:
+        return
+    most, got = room[i], width[i]
+    if rate is not None:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rates = 1 + np.where(blend > 0, (room / ridge.width - 1) / blend, np.inf)
+        most, got = float(rates.min()), rate
+    # Rounded down, so that what is told is allowed.
+    digits = 10.0 ** (3 - math.floor(math.log10(most)))
+    raise ValueError(
+        f"{name}: expected at most {math.floor(most * digits) / digits:g} at arc length "
+        f"{ridge.arc_length[i]:.4g}, so that the feet stay on the flanks, got {got:g}; use a smaller {name}, "
+        "or register with a larger border"
+    )

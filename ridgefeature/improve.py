@@ -29,7 +29,7 @@ _LEAN = (0.2, 0.2, 0.35)
 to the ridge where the data are poor."""
 _LEAST_SCALE = 5e-3
 """Least noise scale, in parts of the height: residuals below it are the model's own, never outliers."""
-_LEAST_CONTRAST = 0.05
+LEAST_CONTRAST = 0.05
 """Least noise scale of evidence, in parts of the height, so that misfit of the model does not count."""
 
 _LOSS = {
@@ -195,7 +195,7 @@ def start_loss(window: Window, start: Template, scale: float) -> float:
     points = window(start)
     if len(points) < FEWEST_POINTS:
         return np.inf
-    scale = max(scale, _LEAST_CONTRAST * abs(start.height))
+    scale = max(scale, LEAST_CONTRAST * abs(start.height))
     mean, _ = appraise.mean_loss(points, *start.shape, scale, *_HUBER)
     return float(mean)
 
@@ -283,7 +283,7 @@ def _noted(
 
     Misfit of a few per cent of the height is no evidence.
     """
-    contrast = _LEAST_CONTRAST * abs(template.height)
+    contrast = LEAST_CONTRAST * abs(template.height)
     scale, far, evidence = assess(points, *template.shape, floor(template), contrast, *loss_of(settings))
     noted = template.changed(
         scale=scale, evaluations=evaluations, status=status, points=len(points), evidence=evidence

@@ -23,7 +23,7 @@ _SMALLEST_SHIFT = 0.01
 _MUCH_BETTER = 0.8
 _STEEP = 0.4
 """Height of a bell, in its widths, from which on the march may do better with another section."""
-_LEAST_CONTRAST = 0.02
+_LEAST_NOISE = 0.02
 """Least noise scale, in parts of the height, by which the first template's section is judged."""
 _DOUBT = 6.0
 """Log likelihood ratio from which on the march takes another section."""
@@ -50,7 +50,7 @@ def march_section(window: Window, first: Template, settings: Settings) -> Templa
     steep = improve(window, with_section(first, plateau()), settings)
     if steep.status in ("failed", "no data") or not steep.height * first.height > 0:
         return first
-    scale = max(min(first.scale, steep.scale), _LEAST_CONTRAST * abs(first.height))
+    scale = max(min(first.scale, steep.scale), _LEAST_NOISE * abs(first.height))
     apart, losses = [], []
     for template in (first, steep):
         seen = _seen_from(template, points, first)

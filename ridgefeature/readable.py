@@ -1,6 +1,58 @@
-"""Numbers for people."""
+"""Numbers and figures for people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ridgefeature.diagnosis import Diagnosis
+    from ridgefeature.ridge import Ridge
 
 
 def number(value: float, digits: int = 4) -> str:
     """So many significant digits, and no exponent for large numbers."""
     return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
+
+
+def rows(ridge: Ridge, found: Diagnosis) -> list[tuple[str, str]]:
+    """The diagnosis for people: names and values."""
+    unit = ridge.unit
+    return [
+        ("coverage", f"{100 * found.coverage:.1f} % of the surface between the feet has points"),
+        ("outliers", f"{100 * found.outliers:.1f} % of {len(found.deviation):,} points"),
+        ("noise level", f"{number(found.noise, 3)} {unit}"),
+        ("reduced chi-square", f"{number(found.reduced_chi_square, 3)} (1: the surface misses nothing)"),
+        *ends(ridge),
+        ("in doubt", "; ".join(told(found.doubts, unit)) or "no stretch"),
+    ]
+
+
+def ends(ridge: Ridge) -> list[tuple[str, str]]:
+    """Why each end stopped and where it lies, for people: names and values."""
+    if ridge.closed:
+        return [("ends", "none, the ridge is closed")]
+    where = [""] * 2
+    if ridge.end_interval is not None:
+        where = [
+            f" (between s = {number(low, 3)} and {number(high, 3)} {ridge.unit} to 95 %)"
+            if np.isfinite(low)
+            else ""
+            for low, high in ridge.end_interval
+        ]
+    return [
+        (f"{name} stopped because", why + at)
+        for name, why, at in zip(("start", "end"), ridge.stop, where, strict=True)
+    ]
+
+
+def told(doubts: tuple[tuple[float, float, str], ...], unit: str) -> list[str]:
+    """The stretches in doubt, in words, by reason."""
+    reasons = dict.fromkeys(why for _, _, why in doubts)
+    return [
+        f"{reason} at s = "
+        + ", ".join(f"{number(a, 3)} to {number(b, 3)}" for a, b, why in doubts if why == reason)
+        + f" {unit}"
+        for reason in reasons
+    ]

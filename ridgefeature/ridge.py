@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.base import Base, RuledBase, registered_base
 from ridgefeature.bspline import Surface
-from ridgefeature.fitting import stretched
-from ridgefeature.merge import LEAST_BORDER, along, merged_surface
+from ridgefeature.fitting import check_widths, stretched
+from ridgefeature.merge import along, merged_surface
 from ridgefeature.on_base import surface_on
 from ridgefeature.scan import Scan, Source
 from ridgefeature.section import Section
@@ -132,17 +132,7 @@ class Ridge(Stations):
         blend = self._blend(between)
         new_height, height_rate = self._changed("height", "h", self.height, h, height, blend)
         new_width, width_rate = self._changed("width", "w", self.width, w, width, blend)
-        if not (new_width > 0).all():
-            raise ValueError(
-                f"width: expected values above 0 everywhere, got {new_width.min():g}; use a larger w"
-            )
-        room = self.border / LEAST_BORDER
-        if (new_width > room).any():
-            i = int(np.argmax(new_width / room))
-            raise ValueError(
-                f"width: expected at most {room[i]:g} at arc length {self.arc_length[i]:g} so that the feet "
-                f"stay on the flanks, got {new_width[i]:g}; use a smaller w or register with a larger border"
-            )
+        check_widths(self, new_width, w, blend)
         rates = {"height_std": np.abs(height_rate), "width_std": width_rate}
         rates["half_height_width_std"] = width_rate
         stds: dict[str, Any] = {name: _times(getattr(self, name), rate) for name, rate in rates.items()}

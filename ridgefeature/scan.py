@@ -168,6 +168,11 @@ def _checked(points: Array) -> tuple[Array, Array]:
         total = len(points)
         points = points[validate.finite_rows(points)]
         points.flags.writeable = False
+        if not len(points):
+            raise ValueError(
+                f"a scan needs at least {MIN_POINTS} distinct finite points; got {total} that are not finite "
+                f"(NaN, inf or beyond {validate.LARGEST:g}): check that the right file or array was taken"
+            )
         warnings.warn(
             f"dropped {bad} of {total} points that are not finite (NaN, inf or beyond {validate.LARGEST:g})",
             UserWarning,

@@ -41,10 +41,12 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, sett
 
 
 def unknown_height(stations: Stations) -> str:
-    """Why a fitted ridge is none after all: its height is hardly known; empty if it is.
+    """Why a fitted ridge is none after all: its height is hardly known, or its width none; else empty.
 
     Where a fit went through something else its standard deviations are about as large as the height.
     """
+    if not (stations.width > 0).all():
+        return f"the width of what was fitted there falls to {stations.width.min():.4g}"
     height, std = np.abs(stations.height), stations.height_std
     told = np.isfinite(std)
     if not told.any() or np.median(std[told] / np.maximum(height[told], 1e-300)) <= _UNKNOWN:

@@ -136,6 +136,46 @@ def test_a_lower_face_that_folds_is_an_error() -> None:
         cx.solid(bowl, thickness=60.0)
 
 
+def told(text: str, words: str) -> float:
+    """The number after these words."""
+    return float(text.partition(words)[2].split()[0].rstrip(",;"))
+
+
+def test_the_largest_thickness_that_is_told_goes() -> None:
+    bowl = ridge_surface(height=0.0, slope=-100.0, bend=0.0)
+    with pytest.raises(ValueError, match="at most") as caught:
+        cx.solid(bowl, thickness=60.0, check=False)
+    most = told(str(caught.value), "at most")
+    assert cx.solid(bowl, thickness=most, check=False).isValid()
+    with pytest.raises(ValueError, match="radius of curvature"):
+        cx.solid(bowl, thickness=1.01 * most, check=False)
+
+
+def test_the_least_thickness_that_is_told_goes() -> None:
+    with pytest.raises(ValueError, match="above") as caught:
+        cx.solid(FakeRidge(), thickness=1.0, h=-1)
+    assert cx.solid(FakeRidge(), thickness=1.01 * told(str(caught.value), "above"), h=-1).isValid()
+
+
+def test_a_base_that_folds_has_no_thickness_that_goes() -> None:
+    """Broader to the inside than its path's radius of 40."""
+    flat = ridge_surface(height=0.0, slope=0.0, bend=0.0)
+    middle = flat.poles[:, 6:7]
+    folded = dataclasses.replace(flat, poles=middle + 8 * (flat.poles - middle))
+    with pytest.raises(ValueError, match="does not fold, got one that does at arc length"):
+        cx.solid(folded, thickness=0.1)
+
+
+def test_a_thickness_at_which_the_slab_meets_itself_is_told_with_one_that_goes() -> None:
+    """A helix whose turns lie above each other: the slab below one reaches the next."""
+    surface = ridge_surface(turn=2.4 * np.pi, slope=0.2, bend=0.0, rows=40)
+    with pytest.raises(ValueError, match="self-intersections") as caught:
+        cx.solid(surface, thickness=12.0)
+    most = told(str(caught.value), "one of at most")
+    assert 3.0 < most < 8.0
+    assert cx.solid(surface, thickness=most).isValid()
+
+
 def test_a_path_that_crosses_itself_is_an_error() -> None:
     surface = ridge_surface(turn=2.2 * np.pi, slope=0.02, rows=12)
     with pytest.raises(ValueError, match="self-intersections"):

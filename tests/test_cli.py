@@ -40,11 +40,12 @@ def feature(done: tuple[Path, Result]) -> Path:
     return done[0] / "feature.ridge.json"
 
 
-def test_register_writes_the_four_files_and_a_summary(done: tuple[Path, Result]) -> None:
+def test_register_writes_the_five_files_and_a_summary(done: tuple[Path, Result]) -> None:
     folder, result = done
     assert result.exit_code == 0, result.stderr
     assert result.stderr == ""
     assert sorted(p.name for p in folder.iterdir()) == [
+        "deviation.png",
         "feature.ridge.json",
         "profile.png",
         "ridge.step",
@@ -242,7 +243,7 @@ def test_an_interrupted_march_keeps_and_writes_what_it_has(
     assert result.exit_code == 130
     assert len(result.stderr.splitlines()) == 1 and "interrupted" in result.stderr
     assert json.loads(result.stdout)["interrupted"] is True
-    assert len(list(tmp_path.iterdir())) == 4
+    assert len(list(tmp_path.iterdir())) == 5
     ridge = rf.load(tmp_path / "feature.ridge.json")
     assert "interrupted" in ridge.stop
     assert 3 <= len(ridge.templates) <= 6

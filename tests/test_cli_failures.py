@@ -61,21 +61,65 @@ def test_bad_scan_files(
     [
         (("--at", 500, 0, 0), "450"),
         (("--at", "nan", 0, 0), "finite"),
-        (("--at", 1, 2), "--at"),
-        ((), "--at"),
-        ((*AT, "--width", -3), "width"),
-        ((*AT, "--width", 0), "width"),
-        ((*AT, "--height", "x"), "--height"),
-        ((*AT, "--direction", 0, 0, 0), "direction"),
-        ((*AT, "--roi", -1), "roi"),
+        (("--at", 1, 2), "--at X Y Z, apart by spaces: The pick"),
+        (("--at", "1,2,3"), "--at X Y Z, apart by spaces"),
+        (("--at", 1, 2, "x"), "'x' is not a valid float; expected --at X Y Z"),
+        ((), "Missing option '--at'; expected --at X Y Z"),
+        ((), "register --help tells all"),
+        ((*AT, "--width", -3), "--width: expected a number above 0"),
+        ((*AT, "--width", 0), "--width: expected"),
+        ((*AT, "--height", "x"), "expected --height H: Starting guess"),
+        ((*AT, "--direction", 0, 0, 0), "--direction: expected"),
+        ((*AT, "--direction", 1, 0), "--direction DX DY DZ, apart by spaces"),
+        ((*AT, "--max-templates", 0), "--max-templates: expected"),
+        ((*AT, "--roi", -1), "--roi: expected"),
         ((*AT, "--unit", "foot"), "foot"),
         ((*AT, "--kind", "hill"), "groove"),
         ((*AT, "--wdth", 3), "--width"),
+        ((*AT, "--wdth", 3), "No such option '--wdth'"),
     ],
 )
 def test_bad_options(words: tuple[object, ...], said: str, scan_file: Path, tmp_path: Path) -> None:
     fails(run("register", scan_file, "--out", tmp_path / "o", *words), 2, said)
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "register"),
+        (("registre",), "--help tells all"),
+        (("register",), "Missing argument 'SCAN'"),
+        (("export", "x.ridge.json"), "-o"),
+        (("info",), "info --help tells all"),
+    ],
+)
+def test_a_command_line_that_is_not_whole_says_where_help_is(words: tuple[str, ...], said: str) -> None:
+    result = run(*words)
+    if words:
+        fails(result, 2, said)
+    else:
+        assert said in result.stdout and result.exit_code == 0
+
+
+def test_a_feature_is_not_registered_again(feature: Path, tmp_path: Path) -> None:
+    said = "registered already", "ridgefeature info", "ridgefeature export"
+    fails(run("register", feature, *AT, "--out", tmp_path / "o"), 2, feature.name, *said)
+    with pytest.raises(ValueError, match=r"ridgefeature\.load"):
+        rf.read_scan(feature)
+
+
+@pytest.mark.parametrize("command", ["export", "register"])
+def test_a_file_of_no_use_there(command: str, tmp_path: Path) -> None:
+    (tmp_path / "notes.md").write_text("ridge")
+    words = ("-o", tmp_path / "x.step") if command == "export" else (*AT, "--out", tmp_path / "o")
+    fails(run(command, tmp_path / "notes.md", *words), 2, "notes.md", "'.md'", "expected")
+
+
+def test_a_scan_is_not_exported(scan_file: Path, tmp_path: Path) -> None:
+    said = "got a NumPy array", f"ridgefeature register {scan_file} --at X Y Z"
+    fails(run("export", scan_file, "-o", tmp_path / "x.step"), 2, *said)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_no_ridge_there(tmp_path: Path) -> None:
@@ -86,6 +130,7 @@ def test_no_ridge_there(tmp_path: Path) -> None:
         run("register", tmp_path / "flat.npy", "--at", 0, 0, 0, "--out", tmp_path / "o", "--json"),
         3,
         "no ridge",
+        "give --direction, --width and --height as a start",
     )
     assert not (tmp_path / "o").exists()
 
@@ -134,15 +179,21 @@ def test_bad_feature_files(change: Callable[[str], str], said: str, feature: Pat
     [
         ("x.dwg", (), ".step .stp .iges .igs .brep .stl .3mf .glb .gltf .FCMacro"),
         ("no/x.step", (), "no such folder"),
-        ("x.step", ("--w", -1), "width"),
-        ("x.step", ("--w", 0), "width"),
-        ("x.step", ("--w", 50), "at most"),
-        ("x.step", ("--h", "nan"), "finite"),
+        ("x.step", ("--w", -1), "--w: expected a rate above 0, got -1"),
+        ("x.step", ("--w", 0), "--w: expected a rate above 0, got 0"),
+        ("x.step", ("--w", 50), "--w: expected at most 1."),
+        ("x.step", ("--h", "nan"), "--h: expected finite"),
     ],
 )
 def test_bad_exports(name: str, words: tuple[object, ...], said: str, feature: Path, tmp_path: Path) -> None:
     fails(run("export", feature, "-o", tmp_path / name, *words), 2, said)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_rate_that_is_told_as_the_largest_goes(feature: Path, tmp_path: Path) -> None:
+    told = run("export", feature, "-o", tmp_path / "x.step", "--w", 50).stderr
+    most = told.partition("at most ")[2].split()[0]
+    assert run("export", feature, "-o", tmp_path / "x.step", "--w", most).exit_code == 0
 
 
 def test_a_step_file_without_a_feature(tmp_path: Path) -> None:

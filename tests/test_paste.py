@@ -133,8 +133,8 @@ def test_the_part_can_be_worked_on(ridge, box, top):
     ("options", "says"),
     [
         ({"h": np.nan}, "h: expected"),
-        ({"w": 0}, "width"),
-        ({"w": 9}, "width: expected at most"),
+        ({"w": 0}, "w: expected a rate above 0"),
+        ({"w": 9}, "w: expected at most 1"),
         ({"at": (0, 0)}, "at: expected three"),
         ({"at": (np.nan, 0, 0)}, "at"),
         ({"scale": 0}, "scale: expected"),
@@ -209,3 +209,18 @@ def test_flanks_are_narrowed_where_a_path_bends_and_the_feet_fit(ridge, box, top
 def test_rates_are_numbers(ridge, box, top, name, value):
     with pytest.raises(ValueError, match=f"^{name}: expected a number, a rate, got "):
         cx.paste(ridge, box, face=top, **{name: value})
+
+
+@pytest.mark.parametrize("place", [{"at": (20, 10, 10)}, {"at": (22, 12, 10)}])
+def test_a_second_ridge_at_the_same_place_is_told_of_the_first(place, ridge, box, top):
+    short = ridge.stretched(40.0, "trim")
+    part = cx.paste(short, box, face=top, at=(20, 10, 10), direction=(0, 1, 0), check=False, name="first")
+    rest = max(part.Faces(), key=lambda face: face.Area() if abs(face.Center().z - 10) < 0.5 else 0)
+    with pytest.raises(
+        ValueError, match="at: expected a place clear of ridges pasted before, 'first' is there"
+    ):
+        cx.paste(short, part, **place, check=False)
+    with pytest.raises(ValueError, match="clear of the face's holes and of ridges pasted before"):
+        cx.paste(short, part, face=rest, **place, check=False)
+    beside = cx.paste(short, part, at=(-50, 10, 10), direction=(0, 1, 0), check=False)
+    assert len(cx.carried_by(beside)) == 2

@@ -12,9 +12,12 @@ import pytest
 
 import ridgefeature as rf
 from ridgefeature import plot
+from ridgefeature.curvilinear import crest, local_coordinates, templates_on, thinned
+from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.plot import camera, scene
-from ridgefeature.plot.collapse import local_coordinates, outline, template_places, thinned
+from ridgefeature.plot.marks import outline
 from ridgefeature.readable import number
+from ridgefeature.section import plateau
 from ridgefeature.synthetic import Spiral
 
 SPIRAL = Spiral()
@@ -60,9 +63,65 @@ def test_profile_shows_each_template_with_its_error(ridge: rf.Ridge, tmp_path: P
     (bars,) = figure.axes[0].containers
     points, _, (segments,) = bars
     np.testing.assert_array_equal(points.get_ydata(), [t.height for t in ridge.templates])
-    np.testing.assert_array_equal(points.get_xdata(), template_places(ridge))
+    np.testing.assert_array_equal(points.get_xdata(), templates_on(ridge)[1])
     spans = [np.ptp(segment[:, 1]) for segment in segments.get_segments()]
     np.testing.assert_allclose(spans, [2 * t.std[6] for t in ridge.templates if t.std is not None], rtol=1e-9)
+
+
+def test_widths_of_templates_of_another_section_are_compared_at_half_height(
+    ridge: rf.Ridge, tmp_path: Path
+) -> None:
+    """The feet of a plateau lie elsewhere than those of a bell, on the same points."""
+    rate = ridge.section.half_height_width / plateau().half_height_width
+    others = tuple(t.changed(section=plateau(), width=rate * t.width) for t in ridge.templates)
+    figure = plot.profile(replace(ridge, templates=others), tmp_path / "p.png")
+    axes = figure.axes[1]
+    (bars,) = axes.containers
+    _, places = templates_on(ridge)
+    curve = np.interp(places, ridge.arc_length, ridge.half_height_width)
+    np.testing.assert_allclose(np.asarray(bars[0].get_ydata(), float), curve, rtol=0.1)
+    lines = [line.get_xydata() for line in axes.lines]
+    drawn = np.column_stack([ridge.arc_length, ridge.half_height_width])
+    assert any(np.array_equal(line, drawn) for line in lines)
+
+
+def _with_strangers(ridge: rf.Ridge) -> rf.Ridge:
+    """With a template beyond the end, and one off the path, both as wide as the others."""
+    first, middle = ridge.templates[0], ridge.templates[len(ridge.templates) // 2]
+    beyond = first.changed(position=ridge.spine[0] - 1.5 * first.length * ridge.tangent[0])
+    aside = middle.changed(position=middle.position + middle.width * middle.rotation[:, 1])
+    return replace(ridge, templates=(beyond, *ridge.templates, aside))
+
+
+def test_templates_that_are_no_part_of_the_ridge_are_not_drawn(ridge: rf.Ridge, tmp_path: Path) -> None:
+    changed = _with_strangers(ridge)
+    kept, places = templates_on(changed)
+    assert kept == templates_on(ridge)[0] == ridge.templates
+    assert (np.diff(places) > 0).all() and 0 <= places[0] < places[-1] <= ridge.length
+    (bars,) = plot.profile(changed, tmp_path / "p.png").axes[0].containers
+    assert len(bars[0].get_xdata()) == len(ridge.templates)
+    outlines = scene.build(changed, SPIRAL.points(2000, seed=4)).outlines
+    assert len(outlines) == len(ridge.templates)
+    for line in outlines:
+        s, y, _ = local_coordinates(ridge, line)
+        on_spine = s[np.abs(y) < 0.1 * ridge.width[0]]
+        assert on_spine.min() > -0.1 * ridge.width[0] and on_spine.max() < ridge.length + 0.1 * ridge.width[0]
+
+
+def test_which_templates_are_drawn_does_not_depend_on_how_the_scan_is_turned(ridge: rf.Ridge) -> None:
+    turn, _ = rotation_of(np.array([0.4, -1.1, 0.7]))
+    changed = _with_strangers(ridge)
+    moved = replace(
+        changed,
+        spine=changed.spine @ turn.T + 5,
+        tangent=changed.tangent @ turn.T,
+        normal=changed.normal @ turn.T,
+        templates=tuple(
+            t.changed(position=turn @ t.position + 5, rotation=turn @ t.rotation) for t in changed.templates
+        ),
+    )
+    assert len(templates_on(moved)[0]) == len(templates_on(changed)[0])
+    np.testing.assert_allclose(templates_on(moved)[1], templates_on(changed)[1], atol=1e-9)
 
 
 def test_section_panel_collapses_the_scan(ridge: rf.Ridge, scan: rf.Scan, tmp_path: Path) -> None:
@@ -109,6 +168,24 @@ def test_outline_lies_on_its_template(ridge: rf.Ridge) -> None:
     assert line[:, 2].max() == pytest.approx(template.height, rel=1e-3)
     assert np.abs(line[:, 1]).max() == pytest.approx(template.half_breadth)
     assert np.ptp(line[:, 0]) == pytest.approx(template.length)
+
+
+def test_the_crest_of_a_leaning_section_lies_aside_of_the_spine(ridge: rf.Ridge) -> None:
+    top = ridge.spine + ridge.height[:, None] * ridge.normal
+    np.testing.assert_allclose(crest(ridge), top, atol=0.01)
+    leaning = rf.Section(np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 0.8, 0.1]), "leaning")
+    lines = crest(replace(ridge, section=leaning))
+    aside = ((lines - top) * ridge.across).sum(axis=1) / ridge.width
+    assert (np.abs(aside - 2 / 12) < 0.02).all(), "its largest control point is the second beyond the middle"
+    heights = ((lines - ridge.spine) * ridge.normal).sum(axis=1)
+    assert (heights > 0.95 * ridge.height).all() and (heights < 1.001 * ridge.height).all()
+
+
+def test_an_outline_is_cut_off_where_the_ridge_ends(ridge: rf.Ridge) -> None:
+    template = ridge.templates[3]
+    line = (outline(template, back=0.1 * template.length) - template.position) @ template.rotation
+    assert line[:, 0].min() == pytest.approx(-0.1 * template.length)
+    assert line[:, 0].max() == pytest.approx(0.5 * template.length)
 
 
 def test_thinned_keeps_points_of_the_scan() -> None:
@@ -161,7 +238,7 @@ def _shows_ridge(path: Path, ridge: rf.Ridge, scan: rf.Scan) -> None:
         assert any(words.startswith("end, s = ") for words in said)
     assert orange[1] > 0.05 > orange[0]
     legend = {text.get_text().split()[0] for text in figure.legends[0].get_texts()}
-    assert legend == {"scan", "templates", "ridge", "spine", "pick"}
+    assert legend == {"scan", "templates", "ridge", "crest", "pick"}
 
 
 def test_view_by_vtk(
@@ -177,6 +254,46 @@ def test_view_without_vtk(
 ) -> None:
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkRenderingOpenGL2", None)
     _shows_ridge(tmp_path / "v.png", ridge, scan)
+
+
+@pytest.mark.parametrize("turns", range(0, 8, 2))
+def test_labels_of_a_ring_lie_inside_their_picture(turns: int, tmp_path: Path) -> None:
+    """Wherever on the ring arc length begins."""
+    angle = np.linspace(0, 2 * np.pi, 81) + turns * np.pi / 4
+    out = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(81)])
+    out[-1] = out[0]
+    tangent = np.cross([0.0, 0, 1], out)
+    even = np.ones(81)
+    ring = rf.Ridge(
+        arc_length=np.linspace(0, 60 * np.pi, 81),
+        spine=30 * out,
+        tangent=tangent,
+        normal=np.tile([0.0, 0, 1], (81, 1)),
+        height=2 * even,
+        width=8 * even,
+        height_std=0.1 * even,
+        width_std=0.1 * even,
+        border=6 * even,
+        section=plateau(),
+        templates=(),
+        stop=("closed", "closed"),
+        closed=True,
+        pick=30 * out[0],
+    )
+    template = rf.Template(
+        30 * out[0], np.column_stack([tangent[0], -out[0], [0, 0, 1]]), 8, 2, 6, 2, plateau()
+    )
+    ring = replace(ring, templates=(template,))
+    figure = plot.view(
+        np.random.default_rng(0).uniform(-40, 40, (2000, 3)) * [1, 1, 0], ring, tmp_path / "v.png"
+    )
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    for axes in panels:
+        room = axes.get_window_extent()
+        (words,) = (text for text in axes.texts if text.get_text().startswith("closed"))
+        box = words.get_window_extent(renderer)
+        assert room.x0 < box.x0 < box.x1 < room.x1 and room.y0 < box.y0 < box.y1 < room.y1
 
 
 def test_view_of_few_metres_and_many_points(
@@ -204,11 +321,11 @@ def test_far_points_are_left_out(ridge: rf.Ridge) -> None:
     assert len(scene.build(ridge, points).points) == 2000
 
 
-@pytest.mark.parametrize("draw", ["profile", "view"])
+@pytest.mark.parametrize("draw", ["profile", "view", "deviation"])
 def test_a_folder_that_is_not_there(draw: str, ridge: rf.Ridge, scan: rf.Scan, tmp_path: Path) -> None:
     target = tmp_path / "no" / "x.png"
     with pytest.raises(OSError, match="no"):
-        plot.profile(ridge, target) if draw == "profile" else plot.view(scan, ridge, target)
+        plot.profile(ridge, target) if draw == "profile" else getattr(plot, draw)(scan, ridge, target)
     assert list(tmp_path.iterdir()) == []
 
 

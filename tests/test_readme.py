@@ -77,13 +77,14 @@ def test_ci_runs_the_test_command_word_for_word() -> None:
 
 def test_the_demo_ends_by_naming_files_that_are_there(shown: tuple[Path, str]) -> None:
     folder = shown[0] / "ridge-demo"
-    names = {"spiral.npy", "feature.ridge.json", "ridge.step", "ridge_h1.5.step", "profile.png", "view.png"}
+    pictures = {"profile.png", "view.png", "deviation.png"}
+    names = {"spiral.npy", "feature.ridge.json", "ridge.step", "ridge_h1.5.step", *pictures}
     assert {p.name for p in folder.iterdir()} == names
     truth, _, after = shown[1].partition("Against the truth")[2].partition("Open next")
     errors = [float(line.split()[1]) for line in truth.splitlines() if line.startswith(("height", "width"))]
     assert len(errors) == 2 and max(errors) < 5
     named = [Path(line.split("  ")[0]) for line in after.splitlines() if line.startswith("ridge-demo")]
-    assert len(named) == 4 and all((shown[0] / path).is_file() for path in named)
+    assert len(named) == 5 and all((shown[0] / path).is_file() for path in named)
 
 
 def test_the_python_blocks_run(demo: Path) -> None:
@@ -102,6 +103,7 @@ def test_the_command_lines_run(demo: Path) -> None:
         assert result.exit_code == 0, result.stderr
         assert result.stdout.strip(), line
     assert {p.name for p in (demo / "ridge-out").iterdir()} == {
+        "deviation.png",
         "feature.ridge.json",
         "profile.png",
         "ridge.step",

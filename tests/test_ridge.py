@@ -115,8 +115,8 @@ BAD = [
     ({"height": lambda s: s * np.nan}, "height: expected finite"),
     ({"h": 1.0, "height": 2.0}, "either the rate h or the absolute height"),
     ({"w": 1.0, "width": 2.0}, "either the rate w or the absolute width"),
-    ({"w": 0.0}, "width: expected values above 0"),
-    ({"w": -1.0}, "width: expected values above 0"),
+    ({"w": 0.0}, "w: expected a rate above 0"),
+    ({"w": -1.0}, "w: expected a rate above 0"),
     ({"width": lambda s: 0 * s}, "width: expected values above 0"),
     ({"width": 500.0}, "width: expected at most .* flanks"),
     ({"w": 3.0}, "use a smaller w"),
@@ -154,6 +154,18 @@ def test_the_message_names_the_widest_that_goes(ridge):
     assert np.isfinite(ridge.resized(width=0.999 * most).surface().poles).all()
 
 
+def test_what_is_told_of_a_rate_is_allowed(ridge):
+    """The limit of a rate is a rate, also along a stretch, where the blend takes part of it only."""
+    for between in (None, (0.0, 0.5 * ridge.length), (0.25 * ridge.length, 0.75 * ridge.length)):
+        with pytest.raises(ValueError, match="w: expected at most") as caught:
+            ridge.resized(w=50, between=between)
+        most = float(str(caught.value).split("at most ")[1].split()[0])
+        assert most > 1
+        ridge.resized(w=most, between=between)
+        with pytest.raises(ValueError, match="w: expected at most"):
+            ridge.resized(w=1.01 * most, between=between)
+
+
 # Surface and sections
 
 
@@ -189,7 +201,7 @@ def test_section_at_gives_as_many_points_as_asked(ridge):
         (("x",), "s: expected"),
         ((3.0, 1), "n: expected"),
         ((3.0, 11, np.nan), "h: expected"),
-        ((3.0, 11, 1.0, -1.0), "width: expected"),
+        ((3.0, 11, 1.0, -1.0), "w: expected"),
     ],
 )
 def test_section_at_refuses_what_is_not_on_the_ridge(ridge, arguments, message):

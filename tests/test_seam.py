@@ -336,7 +336,7 @@ def test_off_the_faces_is_an_error_in_words() -> None:
     ("options", "says"),
     [
         ({"h": -50}, "h: expected at least .* another part of the host"),
-        ({"w": 50}, "width: expected at most"),
+        ({"w": 50}, "w: expected at most"),
         ({"at": (36, 0, 5)}, "leaves the face"),
     ],
 )

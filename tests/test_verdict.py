@@ -164,3 +164,5 @@ def test_a_height_that_is_hardly_known_is_no_ridge():
     assert "known to 2" in unknown_height(replace(sure, height_std=2.0 * ones))
     assert "known to 2" in unknown_height(replace(sure, height_std=np.where(s < 14, np.inf, 2.0)))
     assert unknown_height(replace(sure, height_std=np.inf * ones)) == "", "fits by M tell none"
+    ending = np.where(s < s[-1], sure.width, -0.1)
+    assert "width of what was fitted there falls to -0.1" in unknown_height(replace(sure, width=ending))

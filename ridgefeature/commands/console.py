@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 import warnings
 from collections.abc import Iterable
@@ -40,6 +41,8 @@ class Program(click.Group):
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.format_message())
             return 0
+        except click.UsageError as error:
+            return fail(usage(error, self._options()), BAD_INPUT)
         except click.ClickException as error:
             return fail(error.format_message(), BAD_INPUT)
         except (click.Abort, KeyboardInterrupt):
@@ -49,8 +52,42 @@ class Program(click.Group):
         except ValueError as error:
             from ridgefeature import NoRidgeError
 
-            return fail(str(error), NO_RIDGE if isinstance(error, NoRidgeError) else BAD_INPUT)
+            status = NO_RIDGE if isinstance(error, NoRidgeError) else BAD_INPUT
+            return fail(in_options(str(error), {str(o.name) for _, o in self._options()}), status)
         return result if isinstance(result, int) else 0
+
+    def _options(self) -> list[tuple[str, click.Option]]:
+        """The options of all commands, with the command of each."""
+        pairs = [(name, p) for name, command in self.commands.items() for p in command.params]
+        return [(name, p) for name, p in pairs if isinstance(p, click.Option)]
+
+
+def in_options(message: str, names: Iterable[str]) -> str:
+    """The message with Python's words for options, `name:` to begin with and `name=`, as --name."""
+    some = "|".join(sorted(names, key=len, reverse=True))
+
+    def option(match: re.Match[str]) -> str:
+        return f"--{match[1].replace('_', '-')}"
+
+    message = re.sub(rf"^(?:setting )?({some})(?=:)", option, message)
+    return re.sub(rf"(?<![\w-])({some})=(?=[\s,;.)]|$)", option, message)
+
+
+def usage(error: click.UsageError, options: list[tuple[str, click.Option]]) -> str:
+    """What click says of a wrong command line, with what was expected and where all of it is told."""
+    said = error.format_message().rstrip(".")
+    if isinstance(error, click.NoSuchOption) and error.possibilities:
+        return said
+    where = "" if error.ctx is None else error.ctx.command_path
+    option = getattr(error, "param", None)
+    if isinstance(error, click.BadOptionUsage):
+        # click's parser does not tell which command it was.
+        command, option = next(pair for pair in options if error.option_name in pair[1].opts)
+        where = where or f"ridgefeature {command}"
+    if isinstance(option, click.Option) and isinstance(option.metavar, str) and option.help:
+        several = ", apart by spaces" if option.nargs > 1 else ""
+        said += f"; expected {option.opts[-1]} {option.metavar}{several}: {one_line(option.help).rstrip('.')}"
+    return f"{said}; {where} --help tells all"
 
 
 def fail(message: str, status: int) -> int:

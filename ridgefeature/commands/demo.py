@@ -12,6 +12,7 @@ from ridgefeature.commands import output
 from ridgefeature.commands.console import INTERRUPTED, fail, print_table
 from ridgefeature.commands.folder import beside, output_folder
 from ridgefeature.commands.progress import shown_progress
+from ridgefeature.diagnosis import diagnose
 from ridgefeature.readable import number
 from ridgefeature.synthetic import Spiral
 
@@ -38,11 +39,12 @@ def run(folder: Path) -> int:
         with shown_progress(scan.unit) as progress:
             ridge = register(scan, pick, progress=progress)
         click.echo("Writing the feature, STEP and pictures ...\n")
-        files = output.write(ridge, scan, folder, True, True)
+        found = diagnose(ridge, scan)
+        files = output.write(ridge, scan, folder, True, True, found)
         import cad_export
 
         cad_export.step(ridge, folder / TALLER, h=1.5)
-    print_table("The ridge found", output.rows(ridge))
+    print_table("The ridge found", output.rows(ridge, found))
     click.echo()
     print_table("Against the truth", _errors(ridge, spiral))
     click.echo()
@@ -73,6 +75,7 @@ def _next(folder: Path, files: dict[str, str]) -> list[tuple[str, str]]:
     return [
         (files["view"], "the scan with the ridge on it"),
         (files["profile"], "height and width along the ridge"),
+        (files["deviation"], "where to trust it"),
         (files["step"], "the ridge for any CAD program"),
         (str(folder / TALLER), "the same ridge, half as high again"),
         ("your own scan", "ridgefeature register SCAN --at X Y Z"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ridgefeature.commands.feature_file import CAD, check_is_file, chosen, load_feature
+from ridgefeature.commands.feature_file import CAD, check_is_feature, chosen, load_feature
 from ridgefeature.readable import number
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def run(feature: Path, output: Path, h: float | None, w: float | None, name: str
     from cad_export.formats import checked_target, write
 
     checked_target(output)
-    check_is_file(feature)
+    check_is_feature(feature)
     rates: dict[str, float] = {}
     if feature.suffix.lower() in CAD:
         source, rates, said = _from_step(feature, output, h, w, name)

@@ -14,12 +14,24 @@ if TYPE_CHECKING:
 CAD = (".step", ".stp")
 
 
-def check_is_file(path: Path) -> None:
-    """Raises OSError for a path that is not one of a file."""
+def check_is_feature(path: Path) -> None:
+    """Raises OSError for a path that is not one of a file, ValueError for a suffix no feature file has."""
     if path.is_dir():
         raise IsADirectoryError(f"{path}: expected a feature file, this is a folder: name a file in it")
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such file: check the path")
+    suffix = path.suffix.lower()
+    if suffix in (*CAD, ".json"):
+        return
+    from ridgefeature.io.read import FORMATS
+
+    expected = f"{path}: expected a ridge feature, a .ridge.json or a STEP file that carries one"
+    if suffix in FORMATS:
+        raise ValueError(
+            f"{expected}, got {FORMATS[suffix].title}; register a ridge in a scan first: "
+            f"ridgefeature register {path} --at X Y Z"
+        )
+    raise ValueError(f"{expected}, got {suffix!r}; name the file that `ridgefeature register` wrote")
 
 
 def load_feature(path: Path) -> Ridge:
@@ -27,7 +39,7 @@ def load_feature(path: Path) -> Ridge:
 
     Raises OSError or ValueError.
     """
-    check_is_file(path)
+    check_is_feature(path)
     if path.suffix.lower() not in CAD:
         return load(path)
     from cad_export.loading import carried_in, ridge_of

@@ -6,20 +6,25 @@ from pathlib import Path
 from typing import Any
 
 from ridgefeature.commands.console import one_line, point, print_table
-from ridgefeature.readable import number
+from ridgefeature.diagnosis import Diagnosis
+from ridgefeature.readable import ends, number
+from ridgefeature.readable import rows as trust
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
 
-FEATURE, STEP, PROFILE, VIEW = "feature.ridge.json", "ridge.step", "profile.png", "view.png"
+FEATURE, STEP = "feature.ridge.json", "ridge.step"
+PROFILE, VIEW, DEVIATION = "profile.png", "view.png", "deviation.png"
 
 
 def file_names(step: bool, pictures: bool) -> list[str]:
     """The files that `write` writes."""
-    return [FEATURE, *([STEP] if step else []), *([PROFILE, VIEW] if pictures else [])]
+    return [FEATURE, *([STEP] if step else []), *([PROFILE, VIEW, DEVIATION] if pictures else [])]
 
 
-def write(ridge: Ridge, scan: Scan, folder: Path, step: bool, pictures: bool) -> dict[str, str]:
-    """Write the files of a ridge; returns what is in each and its path."""
+def write(
+    ridge: Ridge, scan: Scan, folder: Path, step: bool, pictures: bool, found: Diagnosis | None = None
+) -> dict[str, str]:
+    """Write the files of a ridge; returns what is in each and its path. found: its diagnosis, if there."""
     ridge.save(folder / FEATURE)
     files = {"feature": str(folder / FEATURE)}
     if step:
@@ -32,12 +37,14 @@ def write(ridge: Ridge, scan: Scan, folder: Path, step: bool, pictures: bool) ->
 
         plot.profile(ridge, folder / PROFILE, scan)
         plot.view(scan, ridge, folder / VIEW)
-        files |= {"profile": str(folder / PROFILE), "view": str(folder / VIEW)}
+        plot.deviation(scan, ridge, folder / DEVIATION, found)
+        names = {"profile": PROFILE, "view": VIEW, "deviation": DEVIATION}
+        files |= {kind: str(folder / name) for kind, name in names.items()}
     return files
 
 
-def document(ridge: Ridge) -> dict[str, Any]:
-    """The summary for machines: the ridge's own, and its values at the stations."""
+def document(ridge: Ridge, found: Diagnosis | None = None) -> dict[str, Any]:
+    """The summary for machines: the ridge's own, its values at the stations, and its diagnosis if there."""
     arrays = "arc_length", "height", "height_std", "width", "width_std", "half_height_width"
     return {
         **ridge.summary(),
@@ -45,39 +52,37 @@ def document(ridge: Ridge) -> dict[str, Any]:
         "pick": ridge.pick.tolist(),
         "interrupted": interrupted(ridge),
         "stations": {name: getattr(ridge, name).tolist() for name in arrays},
+        **({} if found is None else {"diagnosis": found.summary()}),
     }
 
 
-def rows(ridge: Ridge) -> list[tuple[str, str]]:
-    """The summary for people."""
-    found, unit = ridge.summary(), ridge.unit
+def rows(ridge: Ridge, found: Diagnosis | None = None) -> list[tuple[str, str]]:
+    """The summary for people; with what its scan tells of it, if that is there."""
+    figures, unit = ridge.summary(), ridge.unit
     return [
         ("length", f"{number(ridge.length)} {unit}{', a ring' if ridge.closed else ''}"),
         ("templates", str(len(ridge.templates))),
         ("height h", _span(ridge.height, unit, ridge.height_std)),
         ("width w, foot to foot", _span(ridge.width, unit, ridge.width_std)),
         ("width at half height", _span(ridge.half_height_width, unit)),
-        ("section", found["section"]),
+        ("section", figures["section"]),
         (
             "mean distance M",
-            f"{number(found['M'], 3)} {unit}, where a perfect patch has {number(found['M_floor'], 3)}",
+            f"{number(figures['M'], 3)} {unit}, where a perfect patch has {number(figures['M_floor'], 3)}",
         ),
-        ("noise", f"{number(found['noise'], 3)} {unit}"),
         ("pick", point(ridge.pick)),
-        *_ends(ridge),
+        *(
+            [("noise", f"{number(figures['noise'], 3)} {unit}"), *ends(ridge)]
+            if found is None
+            else trust(ridge, found)
+        ),
     ]
 
 
-def _ends(ridge: Ridge) -> list[tuple[str, str]]:
-    if ridge.closed:
-        return [("ends", "none, the ridge is closed")]
-    return [("start stopped because", ridge.stop[0]), ("end stopped because", ridge.stop[1])]
-
-
-def show(ridge: Ridge, files: dict[str, str]) -> None:
+def show(ridge: Ridge, files: dict[str, str], found: Diagnosis) -> None:
     """Print the summary and the files written."""
     name = "ridge" if ridge.source is None else f"ridge in {ridge.source.name}"
-    print_table(name, [*rows(ridge), *((f"wrote {kind}", path) for kind, path in files.items())])
+    print_table(name, [*rows(ridge, found), *((f"wrote {kind}", path) for kind, path in files.items())])
 
 
 def interrupted(ridge: Ridge) -> bool:

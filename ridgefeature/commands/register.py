@@ -11,6 +11,7 @@ from ridgefeature.commands.console import INTERRUPTED, fail, print_json
 from ridgefeature.commands.folder import output_folder
 from ridgefeature.commands.options import settings_from
 from ridgefeature.commands.progress import shown_progress
+from ridgefeature.diagnosis import diagnose
 
 
 def run(
@@ -32,11 +33,12 @@ def run(
         points = read_scan(scan, vertices=vertices, unit=unit, **count)
         with shown_progress(points.unit) as progress:
             ridge = register(points, settings=settings, progress=progress, **options)
-        files = output.write(ridge, points, folder, step, pictures)
+        found = diagnose(ridge, points)
+        files = output.write(ridge, points, folder, step, pictures, found)
     if as_json:
-        print_json({**output.document(ridge), "files": files})
+        print_json({**output.document(ridge, found), "files": files})
     else:
-        output.show(ridge, files)
+        output.show(ridge, files, found)
     if output.interrupted(ridge):
         return fail("interrupted: the ridge goes as far as the march had come", INTERRUPTED)
     return 0

@@ -122,6 +122,12 @@ def _checked_path(path: str | os.PathLike[str]) -> Path:
 
 def _format(path: Path) -> Format:
     form = FORMATS.get(path.suffix.lower())
+    if path.suffix.lower() == ".json":
+        raise ValueError(
+            f"{path}: expected a scan, this looks like a ridge that is registered already: load it by "
+            "ridgefeature.load, or see `ridgefeature info` and change its height or width by "
+            "`ridgefeature export`; name the scan to register once more"
+        )
     if form is None:
         raise ValueError(f"{path}: expected one of the suffixes {' '.join(FORMATS)}; got {path.suffix!r}")
     return form

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.plot.collapse import local_coordinates, template_places, thinned
+from ridgefeature.curvilinear import local_coordinates, templates_on, thinned
 from ridgefeature.plot.files import new_figure, save
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
@@ -18,16 +18,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-HEIGHT, WIDTH, POINTS = "#c2410c", "#1d4ed8", "#475569"
+HEIGHT, WIDTH, FEET, POINTS = "#c2410c", "#1d4ed8", "#7c9bd6", "#475569"
 _MOST = 12_000
 
 
 def profile(ridge: Ridge, path: str | os.PathLike[str], scan: Scan | ArrayLike | None = None) -> Figure:
-    """Draw h(s) and w(s) with bands of one standard deviation, and each template's own values.
+    """Draw h(s) and both widths with bands of one standard deviation, and each template's own values.
 
-    With the scan also the section: the scan points of the whole ridge, divided by the local width and height.
-    Lengths in the ridge's unit. Writes a PNG of 1200 x 800 (1700 x 800 with the scan) pixels and returns the
-    figure. Raises OSError if the file cannot be written.
+    Templates are drawn where they are part of the finished ridge, with their widths at half height: the march
+    may have had another section, whose feet lie elsewhere. With the scan also the section: the scan points of
+    the whole ridge, divided by the local width and height. Lengths in the ridge's unit. Writes a PNG of
+    1200 x 800 (1700 x 800 with the scan) pixels and returns the figure. Raises OSError if the file cannot be
+    written.
     """
     figure = new_figure(1200 if scan is None else 1700, 800)
     grid = figure.add_gridspec(
@@ -58,18 +60,17 @@ def profile(ridge: Ridge, path: str | os.PathLike[str], scan: Scan | ArrayLike |
 def _height(axes: Any, ridge: Ridge) -> None:
     name = "height h" if np.median(ridge.height) >= 0 else "height h (below 0: a groove)"
     _band(axes, ridge, ridge.height, ridge.height_std, HEIGHT, "h(s) of the ridge")
-    _templates(axes, ridge, [t.height for t in ridge.templates], 6, HEIGHT)
+    _templates(axes, ridge, 6, HEIGHT)
     axes.set_ylabel(f"{name} [{ridge.unit}]")
     _finish(axes, ridge.height)
 
 
 def _width(axes: Any, ridge: Ridge) -> None:
-    _band(axes, ridge, ridge.width, ridge.width_std, WIDTH, "w(s) between the feet")
-    _templates(axes, ridge, [t.width for t in ridge.templates], 7, WIDTH)
-    axes.plot(
-        ridge.arc_length, ridge.half_height_width, "--", color=WIDTH, lw=1.2, label="width at half height"
-    )
-    axes.set_ylabel(f"width w [{ridge.unit}]")
+    half, half_std = ridge.half_height_width, ridge.half_height_width_std
+    _band(axes, ridge, ridge.width, ridge.width_std, FEET, "w(s) between the feet")
+    _band(axes, ridge, half, half_std, WIDTH, "width at half height")
+    _templates(axes, ridge, 7, WIDTH)
+    axes.set_ylabel(f"width [{ridge.unit}]")
     _finish(axes, ridge.width)
 
 
@@ -83,15 +84,21 @@ def _band(axes: Any, ridge: Ridge, values: Array, std: Array, colour: str, label
         color=colour,
         alpha=0.25,
         lw=0,
-        label="± one standard deviation",
     )
-    axes.plot(ridge.arc_length, values, color=colour, lw=2, label=label)
+    axes.plot(ridge.arc_length, values, color=colour, lw=2, label=f"{label}, ± one standard deviation")
 
 
-def _templates(axes: Any, ridge: Ridge, values: list[float], column: int, colour: str) -> None:
-    bars = [np.nan if t.std is None else t.std[column] for t in ridge.templates]
+def _templates(axes: Any, ridge: Ridge, column: int, colour: str) -> None:
+    """Heights (column 6 of their standard deviations) or widths at half height (7) of single templates."""
+    templates, places = templates_on(ridge)
+    heights = column == 6
+    rates = [1.0 if heights else t.section.half_height_width for t in templates]
+    values = [rate * (t.height if heights else t.width) for rate, t in zip(rates, templates, strict=True)]
+    bars = [
+        np.nan if t.std is None else rate * t.std[column] for rate, t in zip(rates, templates, strict=True)
+    ]
     axes.errorbar(
-        template_places(ridge),
+        places,
         values,
         yerr=np.where(np.isfinite(bars), bars, np.nan),
         fmt="o",
@@ -101,7 +108,7 @@ def _templates(axes: Any, ridge: Ridge, values: list[float], column: int, colour
         ecolor=colour,
         elinewidth=1.2,
         capsize=2.5,
-        label="one template each",
+        label="single templates, as the march fitted them",
     )
 
 
@@ -113,7 +120,7 @@ def _finish(axes: Any, values: Array) -> None:
     axes.set_ylim(low - (room if low < 0 else 0.0), high + (room if high > 0 else 0.0))
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(loc="best", framealpha=0.9, fontsize=9)
+    axes.legend(loc="best", framealpha=0.9, fontsize=9, ncols=2)
 
 
 def _section(axes: Any, ridge: Ridge, points: Array) -> None:

@@ -1,4 +1,4 @@
-"""The view: scan, templates, spine and finished surface, from above and obliquely."""
+"""The view: scan, templates, crest and finished surface, from above and obliquely."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ridgefeature.curvilinear import templates_on
 from ridgefeature.plot import camera as cameras
 from ridgefeature.plot.camera import Camera
 from ridgefeature.plot.files import new_figure, save
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 _COLOURS = "viridis"
 _PICK = "#e11d48"
 _SIZE = (1700, 1000)
+_ROOM = 6
+"""Pixels between a text and the side of its picture."""
 
 
 def view(scan: Scan | ArrayLike, ridge: Ridge, path: str | os.PathLike[str]) -> Figure:
@@ -42,7 +45,7 @@ def view(scan: Scan | ArrayLike, ridge: Ridge, path: str | os.PathLike[str]) -> 
         aspect = place[2] * _SIZE[0] / (place[3] * _SIZE[1])
         eye = look(ridge, scene.surface, aspect)
         _draw(axes, scene, eye, norm, solid)
-        _mark(axes, ridge, eye)
+        _mark(axes, ridge, scene.crest, eye)
         _scale_bar(axes, eye, ridge.unit)
         _triad(axes, eye, aspect)
         axes.set_title(title, loc="left", fontsize=12)
@@ -127,15 +130,15 @@ def _draw_flat(axes: Any, scene: Scene, eye: Camera, colours: Pixels, solid: boo
     axes.add_collection(
         LineCollection([eye.project(x) for x in scene.outlines], colors=TEMPLATE, lw=1.2, zorder=3)
     )
-    axes.plot(*eye.project(scene.spine).T, color=SPINE, lw=3, zorder=4)
+    axes.plot(*eye.project(scene.crest).T, color=SPINE, lw=3, zorder=4)
 
 
-def _mark(axes: Any, ridge: Ridge, eye: Camera) -> None:
+def _mark(axes: Any, ridge: Ridge, crest: Array, eye: Camera) -> None:
     """Start, end and pick; of a ring the place where arc length begins."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=3, foreground="white")]
-    top = eye.project(ridge.spine + ridge.height[:, None] * ridge.normal)
+    top = eye.project(crest)
     total = f"s = {number(ridge.length)} {ridge.unit}"
     marks = [(0, 1, "start, s = 0", "white"), (-1, -2, f"end, {total}", SPINE)]
     if ridge.closed:
@@ -147,7 +150,7 @@ def _mark(axes: Any, ridge: Ridge, eye: Camera) -> None:
         # Off the end of the ridge, unless the text would leave the picture there.
         right = out[0] >= 0 if abs(top[end][0]) < 0.7 * eye.half_width else top[end][0] < 0
         up = out[1] >= 0 if abs(top[end][1]) < 0.85 * eye.half_height else top[end][1] < 0
-        axes.annotate(
+        words = axes.annotate(
             label,
             top[end],
             xytext=(12 if right else -12, 12 if up else -12),
@@ -159,7 +162,18 @@ def _mark(axes: Any, ridge: Ridge, eye: Camera) -> None:
             path_effects=halo,
             zorder=9,
         )
+        _keep_inside(axes, words)
     axes.plot(*eye.project(ridge.pick), "*", ms=17, mfc=_PICK, mec="white", mew=1.2, zorder=8)
+
+
+def _keep_inside(axes: Any, words: Any) -> None:
+    """Move an annotation whose text would be cut off at a side of the picture."""
+    box, room = words.get_window_extent(axes.figure.canvas.get_renderer()), axes.get_window_extent()
+    x, y = words.xyann
+    points = 72 / axes.figure.dpi
+    x += points * (max(room.x0 + _ROOM - box.x0, 0.0) + min(room.x1 - _ROOM - box.x1, 0.0))
+    y += points * (max(room.y0 + _ROOM - box.y0, 0.0) + min(room.y1 - _ROOM - box.y1, 0.0))
+    words.xyann = x, y
 
 
 def _scale_bar(axes: Any, eye: Camera, unit: str) -> None:
@@ -222,7 +236,7 @@ def _legend(figure: Figure, norm: Any, ridge: Ridge) -> None:
         Line2D([], [], marker="o", ls="", ms=6, color="#21918c", label="scan"),
         Line2D([], [], color=TEMPLATE, lw=1.6, label="templates"),
         Patch(color=SURFACE, label="ridge surface"),
-        Line2D([], [], color=SPINE, lw=3.5, label="spine (drawn on the crest)"),
+        Line2D([], [], color=SPINE, lw=3.5, label="crest"),
         Line2D([], [], marker="*", ls="", ms=15, mfc=_PICK, mec="white", label="pick"),
     ]
     figure.legend(
@@ -243,7 +257,7 @@ def _figures(ridge: Ridge) -> str:
         low, high = number(values.min(), 3), number(values.max(), 3)
         return f"{low if low == high else f'{low} to {high}'} {ridge.unit}"
 
-    count = len(ridge.templates)
+    count = len(templates_on(ridge)[0])
     return (
         f"{number(ridge.length)} {ridge.unit} long, {span(ridge.height)} high, {span(ridge.width)} wide, "
         f"{count} template{'s' if count != 1 else ''}"

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvilinear import crest, local_coordinates, templates_on, thinned
 from ridgefeature.plot.camera import Camera
-from ridgefeature.plot.collapse import local_coordinates, outline, thinned
+from ridgefeature.plot.marks import outline
 from ridgefeature.ridge import Ridge
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ _ACROSS = 61
 class Scene:
     """points (n, 3) of the scan near the ridge, their heights (n,) over the base and whether (n,) they lie on
     the ridge's surface; the surface as a grid (nu, nv, 3) with its normals and,
-    across it, its height (nv,) in apex heights; the spine and the outlines of
+    across it, its height (nv,) in apex heights; the crest and the outlines of
     templates as lines (m, 3); noise: how far points usually lie off the surface."""
 
     points: Array
@@ -34,8 +35,8 @@ class Scene:
     on_ridge: NDArray[np.bool_]
     surface: Array
     normals: Array
+    rise: Array
     crest: Array
-    spine: Array
     outlines: list[Array]
     noise: float
 
@@ -57,10 +58,18 @@ def build(ridge: Ridge, points: Array) -> Scene:
         grid,
         normals,
         ridge.section(np.linspace(*surface.domain[1], _ACROSS)),
-        ridge.spine + ridge.height[:, None] * ridge.normal,
-        [outline(t) for t in ridge.templates],
+        crest(ridge),
+        _outlines(ridge),
         float(np.median([t.scale for t in ridge.templates])),
     )
+
+
+def _outlines(ridge: Ridge) -> list[Array]:
+    """Of the templates that are part of the finished ridge, cut off at its ends."""
+    templates, places = templates_on(ridge)
+    if ridge.closed:
+        return [outline(t) for t in templates]
+    return [outline(t, s, ridge.length - s) for t, s in zip(templates, places, strict=True)]
 
 
 def _around(points: Array, grid: Array) -> Array:
@@ -94,7 +103,7 @@ def render(scene: Scene, camera: Camera, colours: Pixels, size: tuple[int, int],
     lift = lift + camera.toward * (0.006 if solid else 2.0) * depth
     for line in scene.outlines:
         _add_line(renderer, line + lift, TEMPLATE, 1.6 * OVERSAMPLING)
-    _add_line(renderer, scene.spine + lift + camera.toward * 0.002 * depth, SPINE, 4.0 * OVERSAMPLING)
+    _add_line(renderer, scene.crest + lift + camera.toward * 0.002 * depth, SPINE, 4.0 * OVERSAMPLING)
     _aim(renderer, camera)
     window = vtkRenderWindow()
     window.SetOffScreenRendering(1)
@@ -155,7 +164,7 @@ def _actor(renderer: Any, data: Any) -> Any:
 
 def surface_colours(scene: Scene) -> Array:
     """(nv, 3), 0 to 1: paler towards the crest, so that a ridge too low for shades is seen."""
-    part = scene.crest[:, None]
+    part = scene.rise[:, None]
     return (1 - part) * 0.86 * np.array(_rgb(SURFACE)) + part * np.array(_rgb(_CREST))
 
 

@@ -1,16 +1,24 @@
-"""Scan points as a ridge sees them: arc length, distance from the spine, height over the base."""
+"""Points as a ridge sees them: arc length, distance from the spine, height over the base."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.ridge import Ridge
-from ridgefeature.template import Template
+if TYPE_CHECKING:
+    from ridgefeature.ridge import Ridge
+    from ridgefeature.template import Template
 
 Array = NDArray[np.float64]
+T = TypeVar("T", bound=np.generic)
 
 _BLOCK = 20_000
+_TOP = 0.9
+"""Height, in that of the apex, from which on a place is on the crest: the apex of a flat top is anywhere."""
+_ASIDE = 0.5
+"""Distance from the spine, in widths between the feet, up to which a template's centre is on the path."""
 
 
 def local_coordinates(ridge: Ridge, points: Array) -> tuple[Array, Array, Array]:
@@ -36,23 +44,29 @@ def local_coordinates(ridge: Ridge, points: Array) -> tuple[Array, Array, Array]
     return s, np.einsum("ij,ij->i", offset, across), np.einsum("ij,ij->i", offset, normal)
 
 
-def template_places(ridge: Ridge) -> Array:
-    """Arc length (m,) of the middle of each template."""
+def templates_on(ridge: Ridge) -> tuple[tuple[Template, ...], Array]:
+    """The templates that are part of the finished ridge, and the arc length (m,) of the middle of each.
+
+    Left out are those whose middle lies beyond the ridge's ends or off its path: the march went there, and
+    the fit of the whole ridge did not follow.
+    """
     middles = np.array([template.position for template in ridge.templates])
-    return local_coordinates(ridge, middles)[0]
+    s, y, _ = local_coordinates(ridge, middles)
+    if ridge.closed:
+        s = s % ridge.length
+    aside = np.abs(y) <= _ASIDE * np.interp(s, ridge.arc_length, ridge.width)
+    on = np.flatnonzero((s >= 0) & (s <= ridge.length) & aside)
+    return tuple(ridge.templates[i] for i in on), s[on]
 
 
-def outline(template: Template, samples: int = 25) -> Array:
-    """A closed line (m, 3) around a template: its section at both ends, its borders between."""
-    y = np.linspace(-template.half_breadth, template.half_breadth, samples)
-    z = template.height * template.section(y / template.width)
-    half = 0.5 * template.length
-    back = np.column_stack([np.full_like(y, -half), y, z])
-    front = np.column_stack([np.full_like(y, half), y, z])[::-1]
-    return template.position + np.concatenate([back, front, back[:1]]) @ template.rotation.T
+def crest(ridge: Ridge) -> Array:
+    """(k, 3) the middle of the highest tenth of each section: aside of the spine, where the section leans."""
+    eta = np.linspace(-0.5, 0.5, 1001)
+    top = eta[ridge.section(eta) >= _TOP]
+    return np.asarray(ridge.surface()(ridge.arc_length, 0.5 * float(top[0] + top[-1])))
 
 
-def thinned(points: Array, most: int) -> Array:
+def thinned(points: NDArray[T], most: int) -> NDArray[T]:
     """At most that many of the points, chosen at random (scans come in rows, which even steps would show)."""
     if len(points) <= most:
         return points
