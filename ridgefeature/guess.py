@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
 from ridgefeature.curvature import improve_on_base, less_noisy
+from ridgefeature.grid import build_grid, nearest
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
@@ -35,6 +36,17 @@ _AIM = 0.25
 """Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
 _OFFSETS = np.array([-0.3, 0.0, 0.3])
+_FEWEST_NORMALS = 60
+_AROUND = 10
+"""Points that tell the normal at each of them."""
+_FLATTEST = 0.6
+"""Share of the points, those with the flattest neighbourhoods, whose normals count."""
+_TURNS = np.arange(16) * (np.pi / 8)
+_BEFORE_HIGH = 1.1, 1.6, 2.3
+"""Radii, in widths, in which a high ridge is looked for: its crest is further from its feet than its width."""
+_FURTHER = np.linspace(-0.5, 0.5, 11)
+_OF_EACH, _HIGH_TRIES = 4, 16
+"""Starts kept of one radius, and in all."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +129,51 @@ def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: S
     return sorted(starts, key=lambda start: -start.score)
 
 
+def _normals(points: Array) -> Array:
+    """Unit normals (m, 3), either way round, at those of points (n, 3) about which they lie flattest."""
+    near = nearest(build_grid(points), points, _AROUND)[1]
+    near = near - near.mean(axis=1, keepdims=True)
+    extents, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+    flat = extents[:, 0] / extents.sum(axis=1)
+    return np.asarray(axes[flat <= np.quantile(flat, _FLATTEST), :, 0])
+
+
+def _high_starts(
+    window: Window, pick: Array, extent: float, hints: Hints, section: Section
+) -> list[_Start]:
+    """Straight ridges on flanks so steep that their points do not tell the base's normal, the best first.
+
+    A straight ridge runs along what all normals of its surface are square to. In the plane across it
+    every way up is tried.
+    """
+    radius, last = 3.0 * window.spacing, extent / 2.7
+    if hints.width is not None:
+        radius, last = 1.6 * hints.width, 1.6 * hints.width
+    starts: list[_Start] = []
+    frame = np.eye(3)
+    while radius <= last * (1 + 1e-9):
+        points = window.around(pick, radius, frame)
+        if len(points) >= _FEWEST_NORMALS:
+            frame = principal_axes(points)
+            normals = _normals(points)
+            axes = np.linalg.eigh(normals.T @ normals)[1]
+            along = axes[:, 0] if hints.direction is None else hints.direction
+            widths = [hints.width] if hints.width is not None else [radius / x for x in _BEFORE_HIGH]
+            ups = [np.cos(turn) * axes[:, 2] + np.sin(turn) * axes[:, 1] for turn in _TURNS]
+            found = [_high_start(points, facing(up, along), width, section) for up in ups for width in widths]
+            starts += sorted((s for s in found if s is not None), key=lambda s: -s.score)[:_OF_EACH]
+        radius *= _LADDER
+    return sorted(starts, key=lambda start: -start.score)[:_HIGH_TRIES]
+
+
+def _high_start(points: Array, frame: Array, width: float, section: Section) -> _Start | None:
+    """The best ridge of one width along a frame's first axis, upwards; None if there is none."""
+    found = best_straight_ridge(points @ frame, width, np.zeros(1), _FURTHER, section.table)
+    if found[0] <= 0 or found[3] <= 0:
+        return None
+    return _Start(len(points) * -math.log(max(1.0 - found[0], 1e-6)), width, frame, found)
+
+
 def guess(
     window: Window,
     pick: Array,
@@ -125,17 +182,19 @@ def guess(
     section: Section,
     settings: Settings,
     aimed: bool = True,
+    high: bool = False,
 ) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
     neither a smooth surface nor an edge explains as well, if there are any. aimed: of ridges side by side the
-    one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
+    one nearer to the pick counts more. high: with starts for steep flanks. `extent`, about the diameter of the scan, bounds the widths. A hinted
     direction (to 10 degrees) and width leave less to try.
     """
     best: tuple[bool, float, Template] | None = None
-    for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
+    starts = (_high_starts if high else _starts)(window, pick, extent, hints, section)
+    for tried, start in enumerate(starts):
         if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
