@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
 from ridgefeature.kernels.search import best_straight_ridge, principal_axes
-from ridgefeature.section import Section
+from ridgefeature.section import Section, plateau
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -43,9 +44,11 @@ _FLATTEST = 0.6
 """Share of the points, those with the flattest neighbourhoods, whose normals count."""
 _TURNS = np.arange(16) * (np.pi / 8)
 _BEFORE_HIGH = 1.1, 1.6, 2.3
-"""Radii, in widths, in which a high ridge is looked for: its crest is further from its feet than its width."""
+"""Radii, in widths, in which a high ridge is looked for: crest and feet are further apart than its width."""
 _FURTHER = np.linspace(-0.5, 0.5, 11)
-_OF_EACH, _HIGH_TRIES = 4, 16
+_MUCH_NOISE, _MOST_NOISE = 0.35, 0.15
+"""Noise, in heights, from which on a fit on steep flanks is not looked at further; and of one that is kept."""
+_OF_EACH, _HIGH_TRIES = 6, 24
 """Starts kept of one radius, and in all."""
 
 
@@ -138,9 +141,7 @@ def _normals(points: Array) -> Array:
     return np.asarray(axes[flat <= np.quantile(flat, _FLATTEST), :, 0])
 
 
-def _high_starts(
-    window: Window, pick: Array, extent: float, hints: Hints, section: Section
-) -> list[_Start]:
+def _high_starts(window: Window, pick: Array, extent: float, hints: Hints, section: Section) -> list[_Start]:
     """Straight ridges on flanks so steep that their points do not tell the base's normal, the best first.
 
     A straight ridge runs along what all normals of its surface are square to. In the plane across it
@@ -160,18 +161,32 @@ def _high_starts(
             along = axes[:, 0] if hints.direction is None else hints.direction
             widths = [hints.width] if hints.width is not None else [radius / x for x in _BEFORE_HIGH]
             ups = [np.cos(turn) * axes[:, 2] + np.sin(turn) * axes[:, 1] for turn in _TURNS]
-            found = [_high_start(points, facing(up, along), width, section) for up in ups for width in widths]
+            found = [_high_start(points, facing(up, along), widths, section) for up in ups]
             starts += sorted((s for s in found if s is not None), key=lambda s: -s.score)[:_OF_EACH]
         radius *= _LADDER
     return sorted(starts, key=lambda start: -start.score)[:_HIGH_TRIES]
 
 
-def _high_start(points: Array, frame: Array, width: float, section: Section) -> _Start | None:
-    """The best ridge of one width along a frame's first axis, upwards; None if there is none."""
-    found = best_straight_ridge(points @ frame, width, np.zeros(1), _FURTHER, section.table)
+def _high_start(points: Array, frame: Array, widths: list[float], section: Section) -> _Start | None:
+    """The best ridge of these widths along a frame's first axis, upwards; None if there is none."""
+    tried = [
+        (best_straight_ridge(points @ frame, w, np.zeros(1), _FURTHER, section.table), w) for w in widths
+    ]
+    found, width = max(tried, key=lambda best: float(best[0][0]) if best[0][3] > 0 else 0.0)
     if found[0] <= 0 or found[3] <= 0:
         return None
     return _Start(len(points) * -math.log(max(1.0 - found[0], 1e-6)), width, frame, found)
+
+
+def _templates(
+    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
+) -> Iterator[tuple[Template, bool]]:
+    """Starts to be fitted, and whether they are for steep flanks; these come last."""
+    for start in _starts(window, pick, extent, hints, section):
+        yield _template(start, pick, hints, section, settings), False
+    steep = plateau() if settings.section == "auto" else section
+    for start in _high_starts(window, pick, extent, hints, steep):
+        yield _template(start, pick, hints, steep, settings), True
 
 
 def guess(
@@ -182,34 +197,45 @@ def guess(
     section: Section,
     settings: Settings,
     aimed: bool = True,
-    high: bool = False,
 ) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
     neither a smooth surface nor an edge explains as well, if there are any. aimed: of ridges side by side the
-    one nearer to the pick counts more. high: with starts for steep flanks. `extent`, about the diameter of the scan, bounds the widths. A hinted
+    one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
     direction (to 10 degrees) and width leave less to try.
     """
     best: tuple[bool, float, Template] | None = None
-    starts = (_high_starts if high else _starts)(window, pick, extent, hints, section)
-    for tried, start in enumerate(starts):
-        if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
+    starts = _templates(window, pick, extent, hints, section, settings)
+    for tried, (start, high) in enumerate(starts):
+        if tried >= _FEWEST_TRIES and not high and best is not None and best[0] and best[1] > _CLEAR:
             break
-        fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
+        fitted = _fitted(window, start, pick, settings)
+        if high and 0.0 < fitted.scale < _MUCH_NOISE * abs(fitted.height):
+            # Where one flank is seen from below, as a ridge beside the ground, this is what shows it.
+            fitted = _fitted(window, sized(fitted, settings), pick, settings)
         score = _score(window, fitted, pick, aimed)
         if score <= 0 or fitted.width > settings.widest * extent:
             continue
         if best is not None and best[0] and score <= best[1]:
             continue
-        clear = distinct(window, fitted, settings) >= _DISTINCT * settings.distinct
+        told = distinct(window, fitted, settings) / settings.distinct
+        if high and (told < 1.0 or not _stands_high(fitted, settings)):
+            continue
+        clear = told >= _DISTINCT
         if best is None or (clear, score) > best[:2]:
             best = clear, score, fitted
     if best is None:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
     return _fitted(window, sized(best[2], settings), pick, settings)
+
+
+def _stands_high(fitted: Template, settings: Settings) -> bool:
+    """Whether a fit on steep flanks is about a ridge: an edge between two planes looks like a very high one."""
+    height = abs(fitted.height)
+    return height <= settings.steepest * fitted.width and fitted.scale < _MOST_NOISE * height
 
 
 def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:

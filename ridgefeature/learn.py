@@ -38,9 +38,9 @@ _NARROWER = (1.0, 0.9, 0.8, 0.7)
 """Widths tried for a learned section, in widths of the section before it."""
 
 
-def first_section(settings: Settings, high: bool = False) -> Section:
-    """The section to march with. high: on flanks that are steep."""
-    return SECTIONS.get(settings.section, plateau if high else bell)()
+def first_section(settings: Settings) -> Section:
+    """The section to march with."""
+    return SECTIONS.get(settings.section, bell)()
 
 
 def march_section(window: Window, first: Template, settings: Settings) -> Template:

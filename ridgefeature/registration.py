@@ -72,33 +72,12 @@ def register(
     _check_pick(grid, pick, spacing, extent)
     full = Window(grid, spacing)
     rough = full.thinned(_ROUGH_POINTS)
-    track = _found(rough, full, pick, extent, hints, settings, progress)
-    return _constructed(grid, _directed(track, pick, hints), settings, scan, pick)
-
-
-def _found(
-    rough: Window,
-    full: Window,
-    pick: Array,
-    extent: float,
-    hints: Hints,
-    settings: Settings,
-    progress: Progress | None,
-) -> Track:
-    """The first whole fit that is a ridge: of what lies nearest to the pick, of what explains most about it,
-    of what rises there on steep flanks."""
-    known = rough, full, pick, extent, hints, settings, progress
     try:
-        return _track(*known)
+        track = _track(rough, full, pick, extent, hints, settings, progress)
     except NoRidgeError:
-        pass
-    try:
-        return _track(*known, aimed=False)
-    except NoRidgeError as why:
-        try:
-            return _track(*known, high=True)
-        except NoRidgeError:
-            raise why from None
+        # What lies nearest to the pick is none: what explains most about it may be one.
+        track = _track(rough, full, pick, extent, hints, settings, progress, aimed=False)
+    return _constructed(grid, _directed(track, pick, hints), settings, scan, pick)
 
 
 def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick: Array) -> Ridge:
@@ -139,10 +118,9 @@ def _track(
     settings: Settings,
     progress: Progress | None,
     aimed: bool = True,
-    high: bool = False,
 ) -> Track:
     """The whole fit: march, ends placed, templates settled; settled again where another section is better."""
-    first = guess(rough, pick, extent, hints, first_section(settings, high), settings, aimed, high)
+    first = guess(rough, pick, extent, hints, first_section(settings), settings, aimed)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
