@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,9 +46,11 @@ _BEFORE_HIGH = 1.1, 1.6, 2.3
 """Radii, in widths, in which a high ridge is looked for: crest and feet are further apart than its width."""
 _FURTHER = np.linspace(-0.5, 0.5, 11)
 _MUCH_NOISE, _MOST_NOISE = 0.35, 0.15
-"""Noise, in heights, from which on a fit on steep flanks is not looked at further; and of one that is kept."""
+"""Noise, in heights, from which on a fit on steep flanks is not looked at further; is none."""
 _OF_EACH, _HIGH_TRIES = 6, 24
 """Starts kept of one radius, and in all."""
+_Best = tuple[bool, float, Template]
+"""Whether neither a smooth surface nor an edge explains the window of a fit too, how well it does, and it."""
 
 
 @dataclass(frozen=True)
@@ -178,17 +179,6 @@ def _high_start(points: Array, frame: Array, widths: list[float], section: Secti
     return _Start(len(points) * -math.log(max(1.0 - found[0], 1e-6)), width, frame, found)
 
 
-def _templates(
-    window: Window, pick: Array, extent: float, hints: Hints, section: Section, settings: Settings
-) -> Iterator[tuple[Template, bool]]:
-    """Starts to be fitted, and whether they are for steep flanks; these come last."""
-    for start in _starts(window, pick, extent, hints, section):
-        yield _template(start, pick, hints, section, settings), False
-    steep = plateau() if settings.section == "auto" else section
-    for start in _high_starts(window, pick, extent, hints, steep):
-        yield _template(start, pick, hints, steep, settings), True
-
-
 def guess(
     window: Window,
     pick: Array,
@@ -202,38 +192,66 @@ def guess(
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
-    neither a smooth surface nor an edge explains as well, if there are any. aimed: of ridges side by side the
+    neither a smooth surface nor an edge explains as well, if there are any. If none is clear, ridges on steep
+    flanks are tried too. aimed: of ridges side by side the
     one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
     direction (to 10 degrees) and width leave less to try.
     """
-    best: tuple[bool, float, Template] | None = None
-    starts = _templates(window, pick, extent, hints, section, settings)
-    for tried, (start, high) in enumerate(starts):
-        if tried >= _FEWEST_TRIES and not high and best is not None and best[0] and best[1] > _CLEAR:
+    known = window, pick, extent, settings, aimed
+    best: _Best | None = None
+    for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
+        if tried >= _FEWEST_TRIES and _is_clear(best):
             break
-        fitted = _fitted(window, start, pick, settings)
-        if high and 0.0 < fitted.scale < _MUCH_NOISE * abs(fitted.height):
-            # Where one flank is seen from below, as a ridge beside the ground, this is what shows it.
+        fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
+        best = _better(best, fitted, _DISTINCT, *known)
+    if not _is_clear(best):
+        steep = plateau() if settings.section == "auto" else section
+        for start in _high_starts(window, pick, extent, hints, steep):
+            fitted = _fitted(window, _template(start, pick, hints, steep, settings), pick, settings)
+            if not 0.0 < fitted.scale < _MUCH_NOISE * abs(fitted.height):
+                continue
+            # Of one flank seen from below, as a ridge beside the ground, nothing is left in a longer window.
             fitted = _fitted(window, sized(fitted, settings), pick, settings)
-        score = _score(window, fitted, pick, aimed)
-        if score <= 0 or fitted.width > settings.widest * extent:
-            continue
-        if best is not None and best[0] and score <= best[1]:
-            continue
-        told = distinct(window, fitted, settings) / settings.distinct
-        if high and (told < 1.0 or not _stands_high(fitted, settings)):
-            continue
-        clear = told >= _DISTINCT
-        if best is None or (clear, score) > best[:2]:
-            best = clear, score, fitted
+            if _stands_high(fitted, settings):
+                best = _better(best, fitted, 1.0, *known)
     if best is None:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
     return _fitted(window, sized(best[2], settings), pick, settings)
 
 
+def _is_clear(best: _Best | None) -> bool:
+    return best is not None and best[0] and best[1] > _CLEAR
+
+
+def _better(
+    best: _Best | None,
+    fitted: Template,
+    least: float,
+    window: Window,
+    pick: Array,
+    extent: float,
+    settings: Settings,
+    aimed: bool,
+) -> _Best | None:
+    """The better one of the best fit so far and another.
+
+    least: what the other must have of the evidence that tells a whole ridge from other surfaces; where it is
+    all of it, it is left out without.
+    """
+    score = _score(window, fitted, pick, aimed)
+    if score <= 0 or fitted.width > settings.widest * extent:
+        return best
+    if best is not None and best[0] and score <= best[1]:
+        return best
+    clear = distinct(window, fitted, settings) >= least * settings.distinct
+    if least >= 1.0 and not clear:
+        return best
+    return (clear, score, fitted) if best is None or (clear, score) > best[:2] else best
+
+
 def _stands_high(fitted: Template, settings: Settings) -> bool:
-    """Whether a fit on steep flanks is about a ridge: an edge between two planes looks like a very high one."""
+    """Whether a fit on steep flanks is about a ridge: an edge between planes looks like a very high one."""
     height = abs(fitted.height)
     return height <= settings.steepest * fitted.width and fitted.scale < _MOST_NOISE * height
 
