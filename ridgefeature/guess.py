@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,10 @@ _BEFORE_HIGH = 1.1, 1.6, 2.3
 _FURTHER = np.linspace(-0.5, 0.5, 11)
 _MUCH_NOISE, _MOST_NOISE = 0.35, 0.15
 """Noise, in heights, from which on a fit on steep flanks is not looked at further; is none."""
+_STEEP = 0.4
+"""Height, in widths, from which on flanks are steep."""
+_MANY_TRIED = 0.6
+"""How well it explains its window counts by that much less."""
 _OF_EACH, _HIGH_TRIES = 6, 24
 """Starts kept of one radius, and in all."""
 _Best = tuple[bool, float, Template]
@@ -203,17 +207,19 @@ def guess(
         if tried >= _FEWEST_TRIES and _is_clear(best):
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
-        best = _better(best, fitted, _DISTINCT, *known)
+        best = _better(best, fitted, False, *known)
     if not _is_clear(best):
         steep = plateau() if settings.section == "auto" else section
-        for start in _high_starts(window, pick, extent, hints, steep):
-            fitted = _fitted(window, _template(start, pick, hints, steep, settings), pick, settings)
+        # Look-ups of their own: what is tried here must not change what is seen later.
+        apart = replace(window, source=window.source and replace(window.source))
+        for start in _high_starts(apart, pick, extent, hints, steep):
+            fitted = _fitted(apart, _template(start, pick, hints, steep, settings), pick, settings)
             if not 0.0 < fitted.scale < _MUCH_NOISE * abs(fitted.height):
                 continue
             # Of one flank seen from below, as a ridge beside the ground, nothing is left in a longer window.
-            fitted = _fitted(window, sized(fitted, settings), pick, settings)
+            fitted = _fitted(apart, sized(fitted, settings), pick, settings)
             if _stands_high(fitted, settings):
-                best = _better(best, fitted, 1.0, *known)
+                best = _better(best, fitted, True, apart, *known[1:])
     if best is None:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
@@ -227,7 +233,7 @@ def _is_clear(best: _Best | None) -> bool:
 def _better(
     best: _Best | None,
     fitted: Template,
-    least: float,
+    high: bool,
     window: Window,
     pick: Array,
     extent: float,
@@ -236,16 +242,16 @@ def _better(
 ) -> _Best | None:
     """The better one of the best fit so far and another.
 
-    least: what the other must have of the evidence that tells a whole ridge from other surfaces; where it is
-    all of it, it is left out without.
+    high: it is one on steep flanks. Many of them are tried, so one of them must be better beyond chance, and
+    tell a ridge from other surfaces on its own.
     """
-    score = _score(window, fitted, pick, aimed)
+    score = _score(window, fitted, pick, aimed) * (_MANY_TRIED if high else 1.0)
     if score <= 0 or fitted.width > settings.widest * extent:
         return best
     if best is not None and best[0] and score <= best[1]:
         return best
-    clear = distinct(window, fitted, settings) >= least * settings.distinct
-    if least >= 1.0 and not clear:
+    clear = distinct(window, fitted, settings) >= (1.0 if high else _DISTINCT) * settings.distinct
+    if high and not clear:
         return best
     return (clear, score, fitted) if best is None or (clear, score) > best[:2] else best
 
@@ -253,7 +259,8 @@ def _better(
 def _stands_high(fitted: Template, settings: Settings) -> bool:
     """Whether a fit on steep flanks is about a ridge: an edge between planes looks like a very high one."""
     height = abs(fitted.height)
-    return height <= settings.steepest * fitted.width and fitted.scale < _MOST_NOISE * height
+    steep = _STEEP * fitted.width <= height <= settings.steepest * fitted.width
+    return steep and fitted.scale < _MOST_NOISE * height
 
 
 def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:
