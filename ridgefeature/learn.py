@@ -32,7 +32,7 @@ _DOUBT = 6.0
 """Log likelihood ratio from which on the march takes another section."""
 _CLEARLY = 0.98
 """Distance of patch and points, in parts of the bell's, from which on it does so too."""
-_AS_MUCH = 0.98
+_AS_MUCH = 0.9
 """Evidence of all templates with another section, in that with their own, below which they went astray."""
 _NARROWER = (1.0, 0.9, 0.8, 0.7)
 """Widths tried for a learned section, in widths of the section before it."""

@@ -57,6 +57,9 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
             told[id(new)] = terms_of(points, new, settings)
         judged.append(new)
     mended = mend(window, known, judged, track.closed, settings)
+    if not track.closed:
+        # What went on beyond the ridge's end tells nothing of the base under it.
+        mended = _standing(mended, settings)
     if track.closed and len(mended) < FEWEST:
         track = replace(track, closed=False, stop=(FLAT, FLAT))
     if settings.flat:
@@ -198,11 +201,7 @@ def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
     """
     if track.closed:
         return track
-    templates = list(track.templates)
-    while len(templates) > 1 and not _stands(templates[-1], settings):
-        templates.pop()
-    while len(templates) > 1 and not _stands(templates[0], settings):
-        templates.pop(0)
+    templates = _standing(list(track.templates), settings)
     stop = _still_back(templates, track.stop, settings)
     placed = list(place_ends(window, Track(tuple(templates), stop), settings).templates)
     for i, before in ((0, templates[0]), (-1, templates[-1])):
@@ -230,6 +229,12 @@ def _following(templates: list[Template]) -> list[Template]:
     first = 0 if advances(templates[0], templates[1]) else 1
     last = len(templates) if advances(templates[-2], templates[-1]) else -1
     return templates[first:last]
+
+
+def _standing(templates: list[Template], settings: Settings) -> list[Template]:
+    """The templates without end ones that are no ridge; one of them at least."""
+    standing = [i for i, template in enumerate(templates) if _stands(template, settings)]
+    return templates[standing[0] : standing[-1] + 1] if standing else templates[:1]
 
 
 def _stands(template: Template, settings: Settings) -> bool:
