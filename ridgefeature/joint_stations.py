@@ -29,8 +29,8 @@ _NARROWEST, _LOWEST = 0.2, 0.02
 """Least width and height, in those that are usual: neither vanishes nor changes its sign."""
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
-_GROWTHS, _MUCH = 20, (0.1, 0.3)
-"""How often the ends are looked for again; by how many widths one must have moved out, or back, for that."""
+_GROWTHS, _MUCH = 20, 0.3
+"""How often the ends are looked for again; by how many widths one of them must have moved for that."""
 _ALIKE, _ASTRAY = 1.33, 1.6
 """Factor between height or width and those that are usual up to which it is the same ridge; from which on a
 march may have gone astray."""
@@ -130,8 +130,7 @@ def _grown(
     """
     for _ in range(_GROWTHS):
         laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat)
-        out, back = (step * float(np.median(laid.width)) for step in _MUCH)
-        if (max(moved) < out and min(moved) > -back) or as_ring(laid):
+        if max(np.abs(moved)) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:
