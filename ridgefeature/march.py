@@ -49,7 +49,7 @@ _WORSE = 1.5
 """A fit whose noise is this many times that usual of the last three templates is suspect."""
 _EDGE = 10.0
 """Evidence against an edge below which a template that rises high above the last ones is one."""
-_FITS_NOT = 0.25
+_FITS_NOT = 0.35
 """Noise, in heights, above which such a fit is none."""
 
 
