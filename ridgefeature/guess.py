@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
 from ridgefeature.curvature import improve_on_base, less_noisy
+from ridgefeature.grid import build_grid, nearest
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
 from ridgefeature.kernels.search import best_straight_ridge, principal_axes
-from ridgefeature.section import Section
+from ridgefeature.section import Section, plateau
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -35,6 +36,25 @@ _AIM = 0.25
 """Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
 _OFFSETS = np.array([-0.3, 0.0, 0.3])
+_FEWEST_NORMALS = 60
+_AROUND = 10
+"""Points that tell the normal at each of them."""
+_FLATTEST = 0.6
+"""Share of the points, those with the flattest neighbourhoods, whose normals count."""
+_TURNS = np.arange(16) * (np.pi / 8)
+_BEFORE_HIGH = 1.1, 1.6, 2.3
+"""Radii, in widths, in which a high ridge is looked for: crest and feet are further apart than its width."""
+_FURTHER = np.linspace(-0.5, 0.5, 11)
+_MUCH_NOISE, _MOST_NOISE = 0.35, 0.15
+"""Noise, in heights, from which on a fit on steep flanks is not looked at further; is none."""
+_STEEP = 0.4
+"""Height, in widths, from which on flanks are steep."""
+_MANY_TRIED = 0.6
+"""How well it explains its window counts by that much less."""
+_OF_EACH, _HIGH_TRIES = 6, 24
+"""Starts kept of one radius, and in all."""
+_Best = tuple[bool, float, Template]
+"""Whether neither a smooth surface nor an edge explains the window of a fit too, how well it does, and it."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +137,52 @@ def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: S
     return sorted(starts, key=lambda start: -start.score)
 
 
+def _normals(points: Array) -> Array:
+    """Unit normals (m, 3), either way round, at those of points (n, 3) about which they lie flattest."""
+    near = nearest(build_grid(points), points, _AROUND)[1]
+    near = near - near.mean(axis=1, keepdims=True)
+    extents, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+    flat = extents[:, 0] / extents.sum(axis=1)
+    return np.asarray(axes[flat <= np.quantile(flat, _FLATTEST), :, 0])
+
+
+def _high_starts(window: Window, pick: Array, extent: float, hints: Hints, section: Section) -> list[_Start]:
+    """Straight ridges on flanks so steep that their points do not tell the base's normal, the best first.
+
+    A straight ridge runs along what all normals of its surface are square to. In the plane across it
+    every way up is tried.
+    """
+    radius, last = 3.0 * window.spacing, extent / 2.7
+    if hints.width is not None:
+        radius, last = 1.6 * hints.width, 1.6 * hints.width
+    starts: list[_Start] = []
+    frame = np.eye(3)
+    while radius <= last * (1 + 1e-9):
+        points = window.around(pick, radius, frame)
+        if len(points) >= _FEWEST_NORMALS:
+            frame = principal_axes(points)
+            normals = _normals(points)
+            axes = np.linalg.eigh(normals.T @ normals)[1]
+            along = axes[:, 0] if hints.direction is None else hints.direction
+            widths = [hints.width] if hints.width is not None else [radius / x for x in _BEFORE_HIGH]
+            ups = [np.cos(turn) * axes[:, 2] + np.sin(turn) * axes[:, 1] for turn in _TURNS]
+            found = [_high_start(points, facing(up, along), widths, section) for up in ups]
+            starts += sorted((s for s in found if s is not None), key=lambda s: -s.score)[:_OF_EACH]
+        radius *= _LADDER
+    return sorted(starts, key=lambda start: -start.score)[:_HIGH_TRIES]
+
+
+def _high_start(points: Array, frame: Array, widths: list[float], section: Section) -> _Start | None:
+    """The best ridge of these widths along a frame's first axis, upwards; None if there is none."""
+    tried = [
+        (best_straight_ridge(points @ frame, w, np.zeros(1), _FURTHER, section.table), w) for w in widths
+    ]
+    found, width = max(tried, key=lambda best: float(best[0][0]) if best[0][3] > 0 else 0.0)
+    if found[0] <= 0 or found[3] <= 0:
+        return None
+    return _Start(len(points) * -math.log(max(1.0 - found[0], 1e-6)), width, frame, found)
+
+
 def guess(
     window: Window,
     pick: Array,
@@ -130,27 +196,71 @@ def guess(
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
-    neither a smooth surface nor an edge explains as well, if there are any. aimed: of ridges side by side the
+    neither a smooth surface nor an edge explains as well, if there are any. If none is clear, ridges on steep
+    flanks are tried too. aimed: of ridges side by side the
     one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
     direction (to 10 degrees) and width leave less to try.
     """
-    best: tuple[bool, float, Template] | None = None
+    known = window, pick, extent, settings, aimed
+    best: _Best | None = None
     for tried, start in enumerate(_starts(window, pick, extent, hints, section)):
-        if tried >= _FEWEST_TRIES and best is not None and best[0] and best[1] > _CLEAR:
+        if tried >= _FEWEST_TRIES and _is_clear(best):
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)
-        score = _score(window, fitted, pick, aimed)
-        if score <= 0 or fitted.width > settings.widest * extent:
-            continue
-        if best is not None and best[0] and score <= best[1]:
-            continue
-        clear = distinct(window, fitted, settings) >= _DISTINCT * settings.distinct
-        if best is None or (clear, score) > best[:2]:
-            best = clear, score, fitted
+        best = _better(best, fitted, False, *known)
+    if not _is_clear(best):
+        steep = plateau() if settings.section == "auto" else section
+        # Look-ups of their own: what is tried here must not change what is seen later.
+        apart = replace(window, source=window.source and replace(window.source))
+        for start in _high_starts(apart, pick, extent, hints, steep):
+            fitted = _fitted(apart, _template(start, pick, hints, steep, settings), pick, settings)
+            if not 0.0 < fitted.scale < _MUCH_NOISE * abs(fitted.height):
+                continue
+            # Of one flank seen from below, as a ridge beside the ground, nothing is left in a longer window.
+            fitted = _fitted(apart, sized(fitted, settings), pick, settings)
+            if _stands_high(fitted, settings):
+                best = _better(best, fitted, True, apart, *known[1:])
     if best is None:
         return None
     # The length still is that of the start's width, so window and fit get one more round together.
     return _fitted(window, sized(best[2], settings), pick, settings)
+
+
+def _is_clear(best: _Best | None) -> bool:
+    return best is not None and best[0] and best[1] > _CLEAR
+
+
+def _better(
+    best: _Best | None,
+    fitted: Template,
+    high: bool,
+    window: Window,
+    pick: Array,
+    extent: float,
+    settings: Settings,
+    aimed: bool,
+) -> _Best | None:
+    """The better one of the best fit so far and another.
+
+    high: it is one on steep flanks. Many of them are tried, so one of them must be better beyond chance, and
+    tell a ridge from other surfaces on its own.
+    """
+    score = _score(window, fitted, pick, aimed) * (_MANY_TRIED if high else 1.0)
+    if score <= 0 or fitted.width > settings.widest * extent:
+        return best
+    if best is not None and best[0] and score <= best[1]:
+        return best
+    clear = distinct(window, fitted, settings) >= (1.0 if high else _DISTINCT) * settings.distinct
+    if high and not clear:
+        return best
+    return (clear, score, fitted) if best is None or (clear, score) > best[:2] else best
+
+
+def _stands_high(fitted: Template, settings: Settings) -> bool:
+    """Whether a fit on steep flanks is about a ridge: an edge between planes looks like a very high one."""
+    height = abs(fitted.height)
+    steep = _STEEP * fitted.width <= height <= settings.steepest * fitted.width
+    return steep and fitted.scale < _MOST_NOISE * height
 
 
 def _fitted(window: Window, start: Template, pick: Array, settings: Settings) -> Template:

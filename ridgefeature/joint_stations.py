@@ -30,7 +30,7 @@ _NARROWEST, _LOWEST = 0.2, 0.02
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _GROWTHS, _MUCH = 20, 0.3
-"""How often the ends are looked for further out; by how many widths they must have moved for that."""
+"""How often the ends are looked for again; by how many widths one of them must have moved for that."""
 _ALIKE, _ASTRAY = 1.33, 1.6
 """Factor between height or width and those that are usual up to which it is the same ridge; from which on a
 march may have gone astray."""
@@ -125,12 +125,12 @@ def _grown(
 ) -> tuple[Stations, Array | None, Joint]:
     """Stations between the ends, these ends' intervals, and the fit that told them.
 
-    A ridge that is seen further out than the march went may go on beyond what was looked at.
+    A ridge that is seen further out than the march went may go on beyond what was looked at. One that was cut
+    back may go on another way: what lay beyond had bent its path.
     """
     for _ in range(_GROWTHS):
-        before = float(laid.arc_length[-1])
-        laid, intervals = _between_ends(grid, laid, joint, open_ends, settings, flat)
-        if float(laid.arc_length[-1]) < before + _MUCH * float(np.median(laid.width)) or as_ring(laid):
+        laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat)
+        if max(np.abs(moved)) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:
@@ -170,25 +170,26 @@ def _between_ends(
     open_ends: tuple[bool, bool],
     settings: Settings,
     flat: bool,
-) -> tuple[Stations, Array | None]:
-    """The stations between the ends that all points along the path tell, and these ends' intervals."""
+) -> tuple[Stations, Array | None, tuple[float, float]]:
+    """The stations between the ends that all points along the path tell, and these ends' intervals; by how
+    much both ends moved out."""
     length = float(stations.arc_length[-1])
     far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
     path = path_frame(stations, False, (far[0], far[1]))
     fixed = replace(settings, section="bell")  # kept as it is
     wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
-        return stations, None
+        return stations, None, (0.0, 0.0)
     start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead)
     if end - start < _SHORTEST * float(np.median(stations.width)):
-        return stations, None
+        return stations, None, (0.0, 0.0)
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start
     intervals[~np.array(open_ends)] = np.nan
     intervals.setflags(write=False)
     if (start, end) == (0.0, length):
-        return stations, intervals
+        return stations, intervals, (0.0, 0.0)
     count = int(np.clip(round((end - start) / length * (len(stations.arc_length) - 1)) + 1, 13, 401))
-    return stations_of(wide, count, settings, (start, end)), intervals
+    return stations_of(wide, count, settings, (start, end)), intervals, (-start, end - length)
 
 
 def _sound(joint: Joint) -> bool:

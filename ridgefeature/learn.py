@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,9 +11,10 @@ from ridgefeature.improve import improve, limits_of, loss_of, refine, sample, si
 from ridgefeature.kernels import appraise
 from ridgefeature.kernels.appraise import residuals
 from ridgefeature.kernels.base import flattened, on_base
+from ridgefeature.march import Track
 from ridgefeature.section import REACH, SECTIONS, Section, bell, plateau, uniform_basis
 from ridgefeature.settings import Settings
-from ridgefeature.settle import misfit_scale
+from ridgefeature.settle import finish_ends, misfit_scale, settle, settle_base
 from ridgefeature.template import Template
 from ridgefeature.window import Window
 
@@ -29,6 +32,8 @@ _DOUBT = 6.0
 """Log likelihood ratio from which on the march takes another section."""
 _CLEARLY = 0.98
 """Distance of patch and points, in parts of the bell's, from which on it does so too."""
+_AS_MUCH = 0.9
+"""Evidence of all templates with another section, in that with their own, below which they went astray."""
 _NARROWER = (1.0, 0.9, 0.8, 0.7)
 """Widths tried for a learned section, in widths of the section before it."""
 
@@ -105,6 +110,16 @@ def choose_section(window: Window, templates: tuple[Template, ...], settings: Se
         if loss < _MUCH_BETTER * least - price:
             best, least = section, loss
     return best
+
+
+def resettled(window: Window, track: Track, section: Section, settings: Settings) -> Track:
+    """The settled track settled with another section; as it was where templates tell less of a ridge then."""
+    templates = tuple(with_section(t, section) for t in track.templates)
+    # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
+    found = settle(window, settle(window, replace(track, templates=templates), settings), settings)
+    found = finish_ends(window, settle_base(window, found, settings), settings)
+    before, after = (sum(t.evidence for t in told.templates) for told in (track, found))
+    return found if after > _AS_MUCH * before else track
 
 
 def with_section(template: Template, section: Section) -> Template:

@@ -34,9 +34,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[Template], None]
 
 INTERRUPTED = "interrupted"
-_RAN_BACK = "it ran back into itself"
+RAN_BACK = "it ran back into itself"
 CAME_HOME = "it came back to where it began"
-GOES_ON = (INTERRUPTED, _RAN_BACK, CAME_HOME, "max_templates")
+GOES_ON = (INTERRUPTED, RAN_BACK, CAME_HOME, "max_templates")
 """How the reasons of a march begin that stopped though the ridge goes on."""
 _WEAK = 5.0
 """Evidence in parts of what is needed to go on, below which a ridge hardly stands out."""
@@ -175,7 +175,7 @@ def march_one_way(
         whole = [*known, *found]
         on = met(fitted, whole[:-2])
         if on >= 0:
-            return CAME_HOME if comes_home(fitted, whole, on) else reason or _RAN_BACK
+            return CAME_HOME if comes_home(fitted, whole, on) else reason or RAN_BACK
         reason, skipped = "", 0.0
         found.append(fitted)
         chain.append(base.add(rough, fitted))

@@ -30,7 +30,8 @@ class PathFrame:
     """A path at n nodes that are evenly spaced in local widths; of a ring it runs on beyond the seam.
 
     at (n,): arc length; knots (n,): place among the knots of splines along the path, from 0; origin, tangent,
-    left, normal (n, 3); curvature (n,) of the base across; height, width (n,) as far as they are known.
+    left, normal (n, 3); curvature (n,) of the base across; height, width (n,) as far as they are known; tall
+    (n,) how far above and below the base points are looked at.
     """
 
     at: Array
@@ -42,6 +43,7 @@ class PathFrame:
     curvature: Array
     height: Array
     width: Array
+    tall: Array
     overlap: float = 0.0
     """Arc length by which a ring runs on; 0: an open path."""
 
@@ -49,11 +51,6 @@ class PathFrame:
     def coefficients(self) -> int:
         """How many a spline along the path has."""
         return round(float(self.knots[-1])) + 3
-
-    @property
-    def tall(self) -> Array:
-        """(n,) how far above and below the base points are looked at."""
-        return 2.0 * np.abs(self.height) + 0.25 * self.width
 
     def between(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """Origin, left, normal (k, 3) and curvature (k,) at arc lengths, as kernels.strip has them."""
@@ -88,6 +85,8 @@ def path_frame(stations: Stations, closed: bool, beyond: tuple[float, float] = (
     tangent = unit(along(s, stations.spine, where, derivative=1, closed=closed))
     normal = spread @ stations.normal
     normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
+    height = spread @ stations.height
+    width = np.maximum(spread @ stations.width, 0.3 * stations.width.min())
     found = PathFrame(
         at,
         even / widths[-1] * spans,
@@ -96,15 +95,19 @@ def path_frame(stations: Stations, closed: bool, beyond: tuple[float, float] = (
         np.cross(normal, tangent),
         normal,
         spread @ stations.curvature,
-        spread @ stations.height,
-        np.maximum(spread @ stations.width, 0.3 * stations.width.min()),
+        height,
+        width,
+        2.0 * np.abs(height) + 0.25 * width,
         overlap,
     )
     return found if closed else _run_on(found, length)
 
 
 def _run_on(path: PathFrame, length: float) -> PathFrame:
-    """The path with the nodes beyond both ends where its last width leads: as curved, and with no height."""
+    """The path with the nodes beyond both ends where its last width leads: as curved, and with no height.
+
+    Points are looked at there as far up as before: the ridge may go on.
+    """
     origin, axes = path.origin.copy(), np.stack([path.tangent, path.left, path.normal], axis=1)
     outside = (path.at < 0) | (path.at > length)
     inner = np.flatnonzero(~outside)

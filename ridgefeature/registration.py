@@ -13,7 +13,7 @@ from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import Hints, guess
 from ridgefeature.improve import sample
-from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, with_section
+from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, resettled
 from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
 from ridgefeature.ridge import Ridge
 from ridgefeature.rings import CLOSED, ring_or_not
@@ -144,10 +144,7 @@ def _track(
     section = choose_section(full, track.templates, settings)
     if section is track.templates[0].section:
         return track
-    templates = tuple(with_section(t, section) for t in track.templates)
-    # Two rounds: what is expected of a template comes from its neighbours, which change with the section too.
-    track = settle(full, settle(full, replace(track, templates=templates), settings), settings)
-    return finish_ends(full, settle_base(full, track, settings), settings)
+    return resettled(full, track, section, settings)
 
 
 def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.continuation import FLAT
+from ridgefeature.continuation import FLAT, append, met
 from ridgefeature.curvature import Found, curved, joined, terms_of
 from ridgefeature.ends import place_ends, trends
 from ridgefeature.improve import Limits, judge, limits_of, refine
 from ridgefeature.kernels import appraise
-from ridgefeature.march import Track
+from ridgefeature.march import RAN_BACK, Track, reverse
 from ridgefeature.neighbours import FEWEST, advances, between, follows, tipped
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -57,6 +57,9 @@ def settle(window: Window, track: Track, settings: Settings) -> Track:
             told[id(new)] = terms_of(points, new, settings)
         judged.append(new)
     mended = mend(window, known, judged, track.closed, settings)
+    if not track.closed:
+        # What went on beyond the ridge's end tells nothing of the base under it.
+        mended = _standing(mended, settings)
     if track.closed and len(mended) < FEWEST:
         track = replace(track, closed=False, stop=(FLAT, FLAT))
     if settings.flat:
@@ -198,18 +201,27 @@ def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
     """
     if track.closed:
         return track
-    templates = list(track.templates)
-    while len(templates) > 1 and not _stands(templates[-1], settings):
-        templates.pop()
-    while len(templates) > 1 and not _stands(templates[0], settings):
-        templates.pop(0)
-    placed = list(place_ends(window, Track(tuple(templates), track.stop), settings).templates)
+    templates = _standing(list(track.templates), settings)
+    stop = _still_back(templates, track.stop, settings)
+    placed = list(place_ends(window, Track(tuple(templates), stop), settings).templates)
     for i, before in ((0, templates[0]), (-1, templates[-1])):
         if abs(placed[i].length / before.length - 1) > _SAME_LENGTH:
             placed[i], _ = _refit(window, placed, i % len(placed), False, settings.marching())
     if len(placed) > 2:
         placed = _following(placed)
-    return replace(track, templates=tuple(placed))
+    return replace(track, templates=tuple(placed), stop=stop)
+
+
+def _still_back(templates: list[Template], stop: tuple[str, str], settings: Settings) -> tuple[str, str]:
+    """Why both ends stopped; one that ran back into the ridge did not if what lay there dropped out."""
+    reasons = list(stop)
+    for i, chain in ((0, [reverse(t) for t in reversed(templates)]), (1, templates)):
+        if reasons[i] != RAN_BACK:
+            continue
+        ahead = append(chain, settings)[0]
+        if all(met(ahead.slid(x * ahead.length), chain[:-2]) < 0 for x in (0.0, 1.0)):
+            reasons[i] = FLAT
+    return reasons[0], reasons[1]
 
 
 def _following(templates: list[Template]) -> list[Template]:
@@ -217,6 +229,12 @@ def _following(templates: list[Template]) -> list[Template]:
     first = 0 if advances(templates[0], templates[1]) else 1
     last = len(templates) if advances(templates[-2], templates[-1]) else -1
     return templates[first:last]
+
+
+def _standing(templates: list[Template], settings: Settings) -> list[Template]:
+    """The templates without end ones that are no ridge; one of them at least."""
+    standing = [i for i, template in enumerate(templates) if _stands(template, settings)]
+    return templates[standing[0] : standing[-1] + 1] if standing else templates[:1]
 
 
 def _stands(template: Template, settings: Settings) -> bool:

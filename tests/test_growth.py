@@ -9,6 +9,7 @@ from oracles import straight_ridge, template_at
 import ridgefeature as rf
 from ridgefeature.grid import build_grid
 from ridgefeature.joint_stations import Refit, refitted
+from ridgefeature.path_frame import path_frame, points_along
 from ridgefeature.section import bell
 from ridgefeature.stations import in_line, lay_out
 from ridgefeature.template import Template
@@ -45,6 +46,26 @@ def test_over_a_gap_wider_than_it_may_look_ahead_it_does_not():
     assert 7.0 < ridge.stations.spine[:, 0].max() < 8.9
     ridge = whole(points, known(*np.arange(-30.0, 1.0, 6.4)), rf.Settings(look_ahead=2.5))
     assert 39.0 < ridge.stations.spine[:, 0].max() < 40.9
+
+
+@pytest.mark.parametrize("height", [3.0, 10.0])
+def test_beyond_its_known_ends_a_ridge_is_looked_for_as_high_as_it_is(height):
+    points, _ = straight_ridge(8000, height=height, half=(40, 14))
+    stations = lay_out(tuple(known(-12.0, -4.0, 4.0, 12.0, height=height)), SETTINGS, False)
+    path = path_frame(stations, False, (16.0, 16.0))
+    seen = points_along(build_grid(points), path, 0.8 * path.width, 10**6)
+    s = np.interp(seen[:, 0], np.arange(len(path.at)), path.at)
+    crests = s[seen[:, 2] > 0.8 * height]
+    assert crests.min() < -15.0 and crests.max() > stations.arc_length[-1] + 15.0
+
+
+def test_a_ridge_goes_on_where_its_last_template_had_bent_its_path():
+    points, _ = straight_ridge(24000, noise=0.05, half=(40, 30))
+    on = known(*np.arange(-36.0, -3.0, 6.4))
+    astray = template_at(position=(3.0, 2.5, 0), turn=(0, 0, 0.8), std=on[0].std, scale=0.05)
+    ridge = whole(points, [*on, astray])
+    assert 39.0 < ridge.stations.spine[:, 0].max() < 40.9
+    assert np.abs(ridge.stations.spine[:, 1]).max() < 0.5
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])

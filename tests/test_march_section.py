@@ -7,8 +7,10 @@ import pytest
 from oracles import template_at, window_on
 
 import ridgefeature as rf
-from ridgefeature.learn import march_section
+from ridgefeature.learn import march_section, resettled
+from ridgefeature.march import Track
 from ridgefeature.section import Section, bell, box, plateau
+from ridgefeature.settle import settle
 
 SETTINGS = rf.Settings()
 
@@ -40,3 +42,13 @@ def test_a_march_on_a_bell_keeps_the_bell():
     assert march_section(window, first, SETTINGS) is first
     named = rf.Settings(section="bell")
     assert march_section(window_on(walled(box(), 8.0, 0.2)), first, named) is first
+
+
+@pytest.mark.parametrize(("own", "other", "kept"), [(bell(), box(), True), (plateau(), bell(), False)])
+def test_a_settled_track_keeps_its_section_where_templates_of_another_tell_less(own, other, kept):
+    window = window_on(walled(bell(), 3.0, 0.1))
+    templates = tuple(template_at(position=(x, 0, 0), section=own) for x in np.arange(-24.0, 25.0, 6.4))
+    track = settle(window, Track(templates, ("", "")), SETTINGS)
+    found = resettled(window, track, other, SETTINGS)
+    assert (found is track) == kept
+    assert {t.section for t in found.templates} == {own if kept else other}

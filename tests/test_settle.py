@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_paths import Scene, circle
 from oracles import straight_ridge, template_at, window_on
 from scipy.spatial.transform import Rotation
 
 import ridgefeature as rf
+from ridgefeature.continuation import FLAT
 from ridgefeature.improve import limits_of, refine
-from ridgefeature.march import Track
+from ridgefeature.march import RAN_BACK, Track
 from ridgefeature.neighbours import advances, alike, between, comes_home, follows, tipped
-from ridgefeature.settle import mend, settle
+from ridgefeature.settle import finish_ends, mend, settle
 from ridgefeature.template import Template
 
 SETTINGS = rf.Settings()
@@ -260,3 +262,22 @@ def test_coming_home_asks_for_the_same_way_and_a_ridge_alike():
     assert not comes_home(again.changed(width=16.0), ring, 0)
     odd = [ring[0].changed(width=2.0), *ring[1:]]
     assert comes_home(again, odd, 0) and not alike(odd[0], odd[1:6])
+
+
+def test_an_end_that_ran_back_did_not_where_what_lay_there_dropped_out():
+    points, _ = straight_ridge(12000, noise=0.05, half=(40, 12))
+    window = window_on(points)
+    straight = tuple(template_at(position=(x, 0, 0)) for x in np.arange(-28.8, 0.0, 6.4))
+    track = settle(window, Track(straight, (RAN_BACK, RAN_BACK)), SETTINGS)
+    assert finish_ends(window, track, SETTINGS).stop == (FLAT, FLAT)
+
+
+def test_an_end_that_still_lies_before_its_own_ridge_ran_back():
+    scene = Scene(circle(24.0), margin=14.0)
+    window = window_on(scene.points(20000, noise=0.05, seed=1))
+    turns = np.arange(23.0) * 2 * np.pi / 23.6
+    chain = tuple(
+        template_at(position=(24 * np.cos(a), 24 * np.sin(a), 0), turn=(0, 0, a + np.pi / 2)) for a in turns
+    )
+    track = settle(window, Track(chain, (FLAT, RAN_BACK)), SETTINGS)
+    assert finish_ends(window, track, SETTINGS).stop == (FLAT, RAN_BACK)

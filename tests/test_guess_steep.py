@@ -1,0 +1,58 @@
+"""GUESS where flanks are steep: one click anywhere on a ridge higher than wide, and none on an edge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ridgefeature as rf
+from ridgefeature.section import box
+
+WIDTH, HEIGHT = 8.0, 14.0
+
+
+def wall(noise: float, strays: float = 0.0) -> np.ndarray:
+    """A wall along x, its points even by area, flanks too."""
+    random = np.random.default_rng(5)
+    y = np.linspace(-24.0, 24.0, 8001)
+    z = HEIGHT * box()(y / WIDTH)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
+    s = random.uniform(0.0, along[-1], 24000)
+    points = np.column_stack(
+        [random.uniform(-50, 50, len(s)), np.interp(s, along, y), np.interp(s, along, z)]
+    )
+    points += random.normal(0.0, noise, points.shape)
+    astray = random.uniform(size=len(points)) < strays
+    points[astray, 2] = random.uniform(-1.0, 2.0, astray.sum()) * HEIGHT
+    return points
+
+
+@pytest.mark.parametrize("strays", [0.0, 0.1])
+def test_a_wall_is_found_from_any_place_on_it(strays):
+    points = wall(0.5, strays)
+    clicks = [(0, 0, HEIGHT), (5, 3.7, 2.0), (-9, -3.6, 7.0), (12, 3.4, 11.0), (20, -3.4, 12.0)]
+    for k, click in enumerate(clicks):
+        turn = Rotation.random(random_state=k).as_matrix()
+        ridge = rf.register(points @ turn.T, at=turn @ np.array(click, dtype=float))
+        assert ridge.length > 95.0
+        inner = slice(2, -2)
+        assert np.abs(ridge.height[inner] / HEIGHT - 1.0).max() < 0.05
+        assert np.abs((ridge.spine @ turn)[inner, 1]).max() < 0.2
+        assert np.median(np.abs(ridge.tangent @ turn)[:, 0]) > 0.999
+
+
+def test_a_hinted_direction_and_width_are_kept_to():
+    points = wall(0.3)
+    ridge = rf.register(points, at=(5, 3.7, 4.0), direction=(1, 0.05, 0), width=WIDTH)
+    assert ridge.length > 95.0 and ridge.tangent[0, 0] > 0.99
+
+
+@pytest.mark.parametrize("kind", ["ridge", "auto"])
+def test_the_edge_of_a_step_is_no_wall(kind):
+    points = wall(0.3)
+    y, z = points[:, 1], points[:, 2]
+    step = np.column_stack([points[:, 0], y, np.where(y < 0, HEIGHT, z)])
+    for click in ((0, 3.6, 7.0), (5, 3.0, HEIGHT), (9, 4.0, 1.0)):
+        with pytest.raises(rf.NoRidgeError):
+            rf.register(step, at=click, kind=kind)
