@@ -24,6 +24,9 @@ _LADDER = 1.4
 _FEWEST = 30
 _PAST_BEST = 3
 """Widths in a row that explain far less than a smaller one did, after which no larger one is tried."""
+_WIDER = 2
+"""Steps of the ladder from a ball that holds more of a high ridge than of its ground to one that does not."""
+_SAME_SIDE = math.cos(math.radians(30.0))
 _FEWEST_TRIES = 2
 _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
@@ -98,23 +101,48 @@ def _template(start: _Start, pick: Array, hints: Hints, section: Section, settin
 
 
 def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: Section) -> list[_Start]:
-    """Straight ridges of the widths of a geometric ladder, the best first."""
+    """Straight ridges of the widths of a geometric ladder, the best first.
+
+    Seen in the frame of the points about the pick, and in that of more of them where this one is turned: of a
+    ridge as high as wide the near ones hardly tell which way is up.
+    """
     radius, last = 3.0 * window.spacing, extent / 2.7
     if hints.width is not None:
         radius = last = 1.1 * hints.width
     starts: list[_Start] = []
-    frame, falling = np.eye(3), 0
-    while radius <= last * (1 + 1e-9) and falling < _PAST_BEST:
-        points = window.around(pick, radius, frame)
+    seen: list[tuple[Array, Array, float]] = []
+    falling = 0
+    while radius <= _LADDER**_WIDER * last * (1 + 1e-9) and falling < _PAST_BEST:
+        points = window.around(pick, radius, seen[-1][1] if seen else np.eye(3))
         if len(points) >= _FEWEST:
-            frame = principal_axes(points)
-            start = _start(points, frame, radius / 1.1, hints, section)
-            if start is not None:
-                most = max((s.score for s in starts), default=0.0)
-                falling = falling + 1 if most > _CLEAR and start.score < 0.4 * most else 0
-                starts.append(start)
+            seen.append((points, principal_axes(points), radius / 1.1))
+            found = _start(*seen[-1], hints, section) if radius <= last * (1 + 1e-9) else None
+            if found is not None:
+                falling = falling + 1 if _falls(found, starts) else 0
+            starts += [s for s in (found, _turned(seen, hints, section)) if s is not None]
         radius *= _LADDER
     return sorted(starts, key=lambda start: -start.score)
+
+
+def _falls(start: _Start, others: list[_Start]) -> bool:
+    """Whether a start explains far less than the best of others did, seen from the same side."""
+    if not others:
+        return False
+    best = max(others, key=lambda s: s.score)
+    return best.score > _CLEAR and start.score < 0.4 * best.score and _same_side(start.frame, best.frame)
+
+
+def _same_side(one: Array, other: Array) -> bool:
+    return abs(float(one[:, 2] @ other[:, 2])) > _SAME_SIDE
+
+
+def _turned(seen: list[tuple[Array, Array, float]], hints: Hints, section: Section) -> _Start | None:
+    """A straight ridge of a smaller width in the frame of the most points seen, where its own is turned."""
+    if len(seen) <= _WIDER:
+        return None
+    points, own, width = seen[-1 - _WIDER]
+    frame = seen[-1][1]
+    return None if _same_side(own, frame) else _start(points, frame, width, hints, section)
 
 
 def guess(
