@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
-from ridgefeature.curvature import improve_on_base, less_noisy
+from ridgefeature.curvature import SEEN, improve_on_base, less_noisy
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.kernels.evidence import explained
@@ -32,8 +32,6 @@ _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
 _DISTINCT = 0.1
 """What one template must have of the evidence that tells a whole ridge from other surfaces."""
-_SEEN_ON_BASE = 0.5
-"""Points that a fit on a curved base must see, in those on a flat one: it fits few of them easily."""
 _AIM = 0.25
 """Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
@@ -187,7 +185,7 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
     curved = improve_on_base(window, start, settings)
     if curved is None or not less_noisy(curved, flat) or _score(window, curved, pick) <= 0:
         return flat
-    if curved.points < _SEEN_ON_BASE * flat.points:
+    if curved.points < SEEN * flat.points:
         return flat
     return curved
 
