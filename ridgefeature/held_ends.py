@@ -52,11 +52,11 @@ def same_ridge(joint: Joint, start: int, end: int) -> int:
     half = NODES_A_WIDTH // 2
     noise, sizes = _noise(joint, start, end), np.abs(joint.terms[:, [H, W]])
     k = end - half
-    while k >= start and noise[k] > _MISFIT:
+    while k > max(start, end - _LATEST * NODES_A_WIDTH) and noise[k] > _MISFIT:
         k -= 1
     cut = k + 1 + half // 2
     before = sizes[max(start, k + 1 + half // 2 - _STRETCH * NODES_A_WIDTH) : cut]
-    if k == end - half or k < end - _LATEST * NODES_A_WIDTH or len(before) < NODES_A_WIDTH:
+    if k == end - half or len(before) < NODES_A_WIDTH:
         return end
     after = sizes[cut : end + 1] / np.median(before, axis=0)
     grown = float(noise[k + 1 : end - half + 1].max()) * (float(after.max()) - 1.0)
