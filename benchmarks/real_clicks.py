@@ -166,10 +166,11 @@ def line_of(track: Track, found: Found) -> str:
             for x in (found.height / track.height, found.width / track.width)
         )
     ridge = found.ridge
+    heights = np.abs(ridge.height) / track.height
     return (
         f"covered {found.covered:.2f} rms {found.rms:.2f} length {ridge.length / track.length:.2f} "
-        f"h {height:.2f} half-height width {width:.2f}, h from {np.abs(ridge.height).min() / track.height:.2f} to "
-        f"{np.abs(ridge.height).max() / track.height:.2f} | {'; '.join(ridge.stop)}"
+        f"h {height:.2f} half-height width {width:.2f}, h from {heights.min():.2f} to "
+        f"{heights.max():.2f} | {'; '.join(ridge.stop)}"
     )
 
 

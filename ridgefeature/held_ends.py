@@ -47,21 +47,44 @@ def same_ridge(joint: Joint, start: int, end: int) -> int:
     """The node up to which a ridge from one node to another is the same one, looked at from its end.
 
     Where it runs into something else (a blob, a body, another ridge) its points no longer fit, and height or
-    width leave what the stretch before showed. What fits is the ridge, however it grows or fades.
+    width leave what the stretch before showed, up to the end. What fits is the ridge, however it grows or
+    fades.
     """
     half = NODES_A_WIDTH // 2
     noise, sizes = _noise(joint, start, end), np.abs(joint.terms[:, [H, W]])
-    k = end - half
-    while k > max(start, end - _LATEST * NODES_A_WIDTH) and noise[k] > _MISFIT:
+    cut, last = end, end - half
+    k, first = last, max(start, end - _LATEST * NODES_A_WIDTH)
+    while k > first:
+        beyond = k
+        while k > first and noise[k] > _MISFIT:
+            k -= 1
+        far = float(noise[k + 1 : beyond + 1].max(initial=0.0))
+        if far > 0 and _leaves(sizes[start : end + 1], k + 1 + half // 2 - start, beyond - start, far):
+            cut = k + 1 + half // 2
         k -= 1
-    cut = k + 1 + half // 2
-    before = sizes[max(start, k + 1 + half // 2 - _STRETCH * NODES_A_WIDTH) : cut]
-    if k == end - half or len(before) < NODES_A_WIDTH:
-        return end
-    after = sizes[cut : end + 1] / np.median(before, axis=0)
-    grown = float(noise[k + 1 : end - half + 1].max()) * (float(after.max()) - 1.0)
-    lower = after[: end - half // 2 - _MARGIN - cut, 0]
-    return cut if grown > _OTHER or (len(lower) > 0 and lower.min() < _LEAST_PART) else end
+    return cut
+
+
+def _leaves(sizes: Array, begin: int, beyond: int, far: float) -> bool:
+    """Whether height or width (n, 2) leave what they were before a stretch that does not fit.
+
+    begin: node where it begins; beyond: from where on points fit again; far: how badly they do not.
+    """
+    before = sizes[max(begin - _STRETCH * NODES_A_WIDTH, 0) : begin]
+    if len(before) < NODES_A_WIDTH:
+        return False
+    usual = np.median(before, axis=0)
+    half = NODES_A_WIDTH // 2
+    after = sizes[beyond + half :] / usual
+    if len(after) > half:
+        return far * (float(np.median(after, axis=0).max()) - 1.0) > _OTHER
+    inside = sizes[begin:] / usual
+    # Of half a width: at an abrupt end a spline overshoots over less.
+    grown = max(
+        float(np.median(inside[i : i + half + 1], axis=0).max()) for i in range(max(len(inside) - half, 1))
+    )
+    lower = inside[: len(inside) - 1 - half // 2 - _MARGIN, 0]
+    return far * (grown - 1.0) > _OTHER or float(lower.min(initial=1.0)) < _LEAST_PART
 
 
 def _noise(joint: Joint, start: int, end: int) -> Array:

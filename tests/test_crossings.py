@@ -99,7 +99,7 @@ def test_a_ridge_ends_where_it_runs_into_a_blob(seed, rise):
 
 
 def blobbed(seed: int, rise: float, size: float, strays: int, section: Section, noise: float) -> np.ndarray:
-    """A ridge along x from -20 to 42 that ends in a blob no wider than itself, in whose shadow nothing is seen."""
+    """A ridge along x from -20 to 42 that ends in a blob no wider than itself, which casts a shadow."""
     places = plane(seed, (-30, 60), (-15, 15))
     x, y = places.T
     blob = rise * H * np.exp(-0.5 * ((x - 44) ** 2 + y**2) / size**2)
