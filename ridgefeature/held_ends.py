@@ -24,6 +24,8 @@ _OTHER, _LEAST_PART = 3.5, 0.15
 the height, in those, is less."""
 _STRETCH, _LATEST = 3, 4
 """Widths of the stretch before, and of the last part of a ridge that is looked at."""
+_AGAIN = 1
+"""Widths up to which it may seem to fit again beyond."""
 _MARGIN = 2
 """Stretches at the very end where a height that is less may be none: they may lie beyond it."""
 _EXPECTED, _FEWEST = 3.0, 0.15
@@ -52,39 +54,39 @@ def same_ridge(joint: Joint, start: int, end: int) -> int:
     """
     half = NODES_A_WIDTH // 2
     noise, sizes = _noise(joint, start, end), np.abs(joint.terms[:, [H, W]])
-    cut, last = end, end - half
-    k, first = last, max(start, end - _LATEST * NODES_A_WIDTH)
+    cut = end
+    k, first = end - half, max(start, end - _LATEST * NODES_A_WIDTH)
     while k > first:
         beyond = k
         while k > first and noise[k] > _MISFIT:
             k -= 1
-        far = float(noise[k + 1 : beyond + 1].max(initial=0.0))
-        if far > 0 and _leaves(sizes[start : end + 1], k + 1 + half // 2 - start, beyond - start, far):
+        # What fits again for long is the ridge after all.
+        near = beyond >= cut - half - _AGAIN * NODES_A_WIDTH
+        if k < beyond and near and _leaves(noise, sizes[: end + 1], start, k + 1, beyond):
             cut = k + 1 + half // 2
         k -= 1
     return cut
 
 
-def _leaves(sizes: Array, begin: int, beyond: int, far: float) -> bool:
-    """Whether height or width (n, 2) leave what they were before a stretch that does not fit.
+def _leaves(noise: Array, sizes: Array, start: int, first: int, last: int) -> bool:
+    """Whether height or width (n, 2) leave what they were before windows that do not fit, from first to last.
 
-    begin: node where it begins; beyond: from where on points fit again; far: how badly they do not.
+    noise: of the windows; start: node where the ridge begins.
     """
-    before = sizes[max(begin - _STRETCH * NODES_A_WIDTH, 0) : begin]
+    half = NODES_A_WIDTH // 2
+    begin = first + half // 2
+    before = sizes[max(start, begin - _STRETCH * NODES_A_WIDTH) : begin]
     if len(before) < NODES_A_WIDTH:
         return False
     usual = np.median(before, axis=0)
-    half = NODES_A_WIDTH // 2
-    after = sizes[beyond + half :] / usual
+    after = sizes[last + half :] / usual
     if len(after) > half:
-        return far * (float(np.median(after, axis=0).max()) - 1.0) > _OTHER
-    inside = sizes[begin:] / usual
+        return float(noise[first : last + 1].max() * (np.median(after, axis=0).max() - 1.0)) > _OTHER
     # Of half a width: at an abrupt end a spline overshoots over less.
-    grown = max(
-        float(np.median(inside[i : i + half + 1], axis=0).max()) for i in range(max(len(inside) - half, 1))
-    )
-    lower = inside[: len(inside) - 1 - half // 2 - _MARGIN, 0]
-    return far * (grown - 1.0) > _OTHER or float(lower.min(initial=1.0)) < _LEAST_PART
+    inside = [np.median(sizes[k : k + half + 1] / usual, axis=0) for k in range(first, last + 1)]
+    grown = max(float(noise[k] * (size.max() - 1.0)) for k, size in enumerate(inside, first))
+    lower = [float(size[0]) for k, size in enumerate(inside, first) if k + half + _MARGIN < len(sizes)]
+    return grown > _OTHER or min(lower, default=1.0) < _LEAST_PART
 
 
 def _noise(joint: Joint, start: int, end: int) -> Array:
