@@ -22,7 +22,7 @@ _MISFIT = 2.5
 _OTHER, _LEAST_PART = 3.5, 0.15
 """It is, where that times the growth of height or width, in those of the stretch before, is more; or where
 the height, in those, is less."""
-_STRETCH, _LATEST = 3, 4
+_STRETCH, _LATEST = 1, 4
 """Widths of the stretch before, and of the last part of a ridge that is looked at."""
 _AGAIN = 1
 """Widths up to which it may seem to fit again beyond."""
