@@ -25,7 +25,7 @@ the height, in those, is less."""
 _STRETCH, _LATEST = 1, 4
 """Widths of the stretch before, and of the last part of a ridge that is looked at."""
 _AGAIN = 1
-"""Widths up to which it may seem to fit again beyond."""
+"""Widths at an end that may seem to fit again, but as another ridge."""
 _MARGIN = 2
 """Stretches at the very end where a height that is less may be none: they may lie beyond it."""
 _EXPECTED, _FEWEST = 3.0, 0.15
@@ -60,9 +60,7 @@ def same_ridge(joint: Joint, start: int, end: int) -> int:
         beyond = k
         while k > first and noise[k] > _MISFIT:
             k -= 1
-        # What fits again for long is the ridge after all.
-        near = beyond >= cut - half - _AGAIN * NODES_A_WIDTH
-        if k < beyond and near and _leaves(noise, sizes[: end + 1], start, k + 1, beyond):
+        if k < beyond and _leaves(noise, sizes[: end + 1], start, k + 1, beyond):
             cut = k + 1 + half // 2
         k -= 1
     return cut
@@ -80,8 +78,10 @@ def _leaves(noise: Array, sizes: Array, start: int, first: int, last: int) -> bo
         return False
     usual = np.median(before, axis=0)
     after = sizes[last + half :] / usual
-    if len(after) > half:
-        return float(noise[first : last + 1].max() * (np.median(after, axis=0).max() - 1.0)) > _OTHER
+    if half < len(after) <= half + _AGAIN * NODES_A_WIDTH:
+        far = float(noise[first : last + 1].max())
+        if far * (float(np.median(after, axis=0).max()) - 1.0) > _OTHER:
+            return True
     # Of half a width: at an abrupt end a spline overshoots over less.
     inside = [np.median(sizes[k : k + half + 1] / usual, axis=0) for k in range(first, last + 1)]
     grown = max(float(noise[k] * (size.max() - 1.0)) for k, size in enumerate(inside, first))
