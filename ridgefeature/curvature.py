@@ -27,6 +27,8 @@ _SURE_OF_SCALE = 0.37
 """Efficiency of the median absolute deviation: degrees of freedom of the scale a point."""
 _UNTOLD = 0.015
 """Curvature in reciprocal widths that a template may see where its path bends or its sizes change."""
+SEEN = 0.5
+"""Points that a fit on a curved base must see, in those on a flat one: it fits few of them easily."""
 _KEPT = 0.6
 """What of earlier templates still counts at the next one."""
 _DRIFTS = 10.0 ** np.arange(-10, 0)
@@ -137,7 +139,7 @@ class Ahead:
             return template.changed(base=both.mean)
         # The first time a curved base must fit better than a flat one, and show the same ridge.
         bent = improve(window, template.changed(base=both.mean), self.settings)
-        alike = 0.5 < bent.width / template.width < 2.0
+        alike = 0.5 < bent.width / template.width < 2.0 and bent.points > SEEN * template.points
         return bent if alike and less_noisy(bent, template) else template
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
-from ridgefeature.curvature import improve_on_base, less_noisy
+from ridgefeature.curvature import SEEN, improve_on_base, less_noisy
 from ridgefeature.grid import build_grid, nearest
 from ridgefeature.improve import improve, sized
 from ridgefeature.kernels.algebra import facing
@@ -25,13 +25,14 @@ _LADDER = 1.4
 _FEWEST = 30
 _PAST_BEST = 3
 """Widths in a row that explain far less than a smaller one did, after which no larger one is tried."""
+_WIDER = 2
+"""Steps of the ladder from a ball that holds more of a high ridge than of its ground to one that does not."""
+_SAME_SIDE = math.cos(math.radians(30.0))
 _FEWEST_TRIES = 2
 _CLEAR = 100.0
 """Score of a fit that leaves no need to try further starts: residuals fall by a third over 300 points."""
 _DISTINCT = 0.1
 """What one template must have of the evidence that tells a whole ridge from other surfaces."""
-_SEEN_ON_BASE = 0.5
-"""Points that a fit on a curved base must see, in those on a flat one: it fits few of them easily."""
 _AIM = 0.25
 """Standard deviation of the pick's distance from the crest, in widths."""
 _ANGLES = np.arange(16) * (np.pi / 16)
@@ -118,21 +119,25 @@ def _template(start: _Start, pick: Array, hints: Hints, section: Section, settin
 
 
 def _starts(window: Window, pick: Array, extent: float, hints: Hints, section: Section) -> list[_Start]:
-    """Straight ridges of the widths of a geometric ladder, the best first."""
+    """Straight ridges of the widths of a geometric ladder, the best first.
+
+    Seen in the frame of the points about the pick, and in that of more of them where this one is turned: of a
+    ridge as high as wide the near ones hardly tell which way is up.
+    """
     radius, last = 3.0 * window.spacing, extent / 2.7
     if hints.width is not None:
         radius = last = 1.1 * hints.width
     starts: list[_Start] = []
-    frame, falling = np.eye(3), 0
-    while radius <= last * (1 + 1e-9) and falling < _PAST_BEST:
-        points = window.around(pick, radius, frame)
+    seen: list[tuple[Array, Array, float]] = []
+    falling = 0
+    while radius <= _LADDER**_WIDER * last * (1 + 1e-9) and falling < _PAST_BEST:
+        points = window.around(pick, radius, seen[-1][1] if seen else np.eye(3))
         if len(points) >= _FEWEST:
-            frame = principal_axes(points)
-            start = _start(points, frame, radius / 1.1, hints, section)
-            if start is not None:
-                most = max((s.score for s in starts), default=0.0)
-                falling = falling + 1 if most > _CLEAR and start.score < 0.4 * most else 0
-                starts.append(start)
+            seen.append((points, principal_axes(points), radius / 1.1))
+            found = _start(*seen[-1], hints, section) if radius <= last * (1 + 1e-9) else None
+            if found is not None:
+                falling = falling + 1 if _falls(found, starts) else 0
+            starts += [s for s in (found, _turned(seen, hints, section)) if s is not None]
         radius *= _LADDER
     return sorted(starts, key=lambda start: -start.score)
 
@@ -181,6 +186,27 @@ def _high_start(points: Array, frame: Array, widths: list[float], section: Secti
     if found[0] <= 0 or found[3] <= 0:
         return None
     return _Start(len(points) * -math.log(max(1.0 - found[0], 1e-6)), width, frame, found)
+
+
+def _falls(start: _Start, others: list[_Start]) -> bool:
+    """Whether a start explains far less than the best of others did, seen from the same side."""
+    if not others:
+        return False
+    best = max(others, key=lambda s: s.score)
+    return best.score > _CLEAR and start.score < 0.4 * best.score and _same_side(start.frame, best.frame)
+
+
+def _same_side(one: Array, other: Array) -> bool:
+    return abs(float(one[:, 2] @ other[:, 2])) > _SAME_SIDE
+
+
+def _turned(seen: list[tuple[Array, Array, float]], hints: Hints, section: Section) -> _Start | None:
+    """A straight ridge of a smaller width in the frame of the most points seen, where its own is turned."""
+    if len(seen) <= _WIDER:
+        return None
+    points, own, width = seen[-1 - _WIDER]
+    frame = seen[-1][1]
+    return None if _same_side(own, frame) else _start(points, frame, width, hints, section)
 
 
 def guess(
@@ -269,7 +295,7 @@ def _fitted(window: Window, start: Template, pick: Array, settings: Settings) ->
     curved = improve_on_base(window, start, settings)
     if curved is None or not less_noisy(curved, flat) or _score(window, curved, pick) <= 0:
         return flat
-    if curved.points < _SEEN_ON_BASE * flat.points:
+    if curved.points < SEEN * flat.points:
         return flat
     return curved
 

@@ -34,6 +34,10 @@ _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _BESIDE = 3.0
 """Flats beside a steep ridge, in those of templates: height and lean hang on how the base is bent."""
+_ON_TOP = 0.8
+"""Height from which on a section is the top."""
+_LEAST_NOISE = 0.02
+"""Distance of points, in heights, that a section may always miss by."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -52,8 +56,8 @@ class Joint:
     counts: Array
     """(n - 1,) points of each stretch, strays too."""
     misfit: Array
-    """(n - 1, 2) points of each stretch between the feet, and the sum of their squared distances from the
-    surface in noise scales, none more than 25."""
+    """(n - 1, 3) points of each stretch between the feet, the sum of their squared distances from the surface
+    in noise scales or, if that is more, least noises, none more than 25, and how many lie near its top."""
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
@@ -148,9 +152,18 @@ def _joint(points: Array, some: Array, path: PathFrame, state: State, fit: Fit) 
 
 
 def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:
-    """(n - 1, 2) as Joint.misfit has it."""
+    """(n - 1, 3) as Joint.misfit has it."""
     place = points[:, 0].astype(np.int64)
-    on = np.abs(points[:, 1] - terms[place, E]) < 0.5 * terms[place, W]
-    far = np.minimum((offsets(points[on], terms, seen.told, scale)[0] / scale) ** 2, _FAR_OFF)
-    both = [np.bincount(place[on], weights, len(terms) - 1) for weights in (None, far)]
-    return np.column_stack(both).astype(np.float64)
+    eta = (points[:, 1] - terms[place, E]) / terms[place, W]
+    on = np.abs(eta) < 0.5
+    place, eta = place[on], eta[on]
+    off = offsets(points[on], terms, seen.told, scale)[0]
+    far = np.minimum((off / max(scale, least_noise(terms))) ** 2, _FAR_OFF)
+    top = (seen.section(eta) > _ON_TOP) & (far < _FAR_OFF)
+    told = [np.bincount(place, weights, len(terms) - 1) for weights in (None, far, top)]
+    return np.column_stack(told).astype(np.float64)
+
+
+def least_noise(terms: Array) -> float:
+    """Distance of points that the section of a ridge with these terms (n, 6) may always miss by."""
+    return _LEAST_NOISE * float(np.median(np.abs(terms[:, H])))

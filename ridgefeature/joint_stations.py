@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.astray import SHORTEST, core_of
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.grid import Grid
+from ridgefeature.held_ends import held
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
 from ridgefeature.joint_rounds import is_steep
 from ridgefeature.kernels.strip import A, C, E, H, W
@@ -31,11 +33,8 @@ _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _GROWTHS, _MUCH = 20, 0.3
 """How often the ends are looked for again; by how many widths one of them must have moved for that."""
-_ALIKE, _ASTRAY = 1.33, 1.6
-"""Factor between height or width and those that are usual up to which it is the same ridge; from which on a
-march may have gone astray."""
-_SHORTEST = 1.5
-"""Length in widths of the shortest ridge that is left of one whose data end."""
+_CUTS = 2
+"""How often an end that its points do not hold is cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ def refitted(
     went astray: then along those that are alike.
     """
     found, sound = _refitted(grid, stations, section, closed, open_ends, settings)
-    core = None if sound or closed else _core(stations)
+    core = None if sound or closed else core_of(stations)
     if core is None:
         return found
     again, sound = _refitted(grid, core, section, closed, (True, True), settings)
@@ -96,28 +95,33 @@ def _refitted(
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
         return Refit(laid, first, intervals, closed), False
-    return Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed), True
+    found = Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed)
+    return found if closed else _held(grid, found, open_ends, settings, flat), True
 
 
-def _core(stations: Stations) -> Stations | None:
-    """The longest stretch whose height and width are near the usual: what is left of a march astray.
-
-    Without a width at either end, which what follows may have bent. None where that is too short, or the
-    march did not go astray.
-    """
-    sizes = np.abs([np.log(np.maximum(v / np.median(v), 1e-9)) for v in (stations.height, stations.width)])
-    alike = (sizes < np.log(_ALIKE)).all(axis=0)
-    if (sizes < np.log(_ASTRAY)).all() or not alike.any():
-        return None
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]]))).reshape(-1, 2)
-    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
-    s, usual = stations.arc_length, float(np.median(stations.width))
-    low, high = s[first] + usual * (first > 0), s[last - 1] - usual * (last < len(s))
-    if high - low < _SHORTEST * usual:
-        return None
-    kept = (s >= low) & (s <= high)
-    parts = {f.name: getattr(stations, f.name)[kept] for f in fields(Stations)}
-    return Stations(**{**parts, "arc_length": s[kept] - s[kept][0]})
+def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Settings, flat: bool) -> Refit:
+    """The open ridge cut at ends that its points do not hold, and fitted again without what lies beyond."""
+    for _ in range(_CUTS):
+        joint, stations = found.joint, found.stations
+        if joint is None:
+            break
+        start, end = held(joint, open_ends)
+        length = end - start
+        if length >= stations.arc_length[-1] or length < SHORTEST * float(np.median(stations.width)):
+            break
+        count = max(round(length / stations.arc_length[1]) + 1, 13)
+        laid = stations_of(joint, count, settings, (start, end))
+        again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
+        if again is None:
+            break
+        intervals = found.end_interval
+        if intervals is not None:
+            intervals = intervals - start
+            intervals[:, 0] = np.minimum(intervals[:, 0], (0.0, length))
+            intervals[:, 1] = np.maximum(intervals[:, 1], (0.0, length))
+            intervals.setflags(write=False)
+        found = Refit(stations_of(again, count, settings), again, intervals)
+    return found
 
 
 def _grown(
@@ -181,7 +185,7 @@ def _between_ends(
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None, (0.0, 0.0)
     start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead)
-    if end - start < _SHORTEST * float(np.median(stations.width)):
+    if end - start < SHORTEST * float(np.median(stations.width)):
         return stations, None, (0.0, 0.0)
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start
     intervals[~np.array(open_ends)] = np.nan

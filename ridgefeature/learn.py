@@ -34,6 +34,8 @@ _CLEARLY = 0.98
 """Distance of patch and points, in parts of the bell's, from which on it does so too."""
 _AS_MUCH = 0.9
 """Evidence of all templates with another section, in that with their own, below which they went astray."""
+_NOISIER = 1.5
+"""Noise of the first template with that section, in that before, from which on its fit went wrong."""
 _NARROWER = (1.0, 0.9, 0.8, 0.7)
 """Widths tried for a learned section, in widths of the section before it."""
 
@@ -64,7 +66,8 @@ def march_section(window: Window, first: Template, settings: Settings) -> Templa
         apart.append(float(forth) + window.mean_distance(sample(template), 1))
     if losses[1] > losses[0] - _DOUBT and apart[1] > _CLEARLY * apart[0]:
         return first
-    return improve(window, sized(steep, settings), settings)
+    longer = improve(window, sized(steep, settings), settings)
+    return longer if longer.scale < _NOISIER * max(first.scale, steep.scale) else first
 
 
 def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:

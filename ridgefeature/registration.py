@@ -31,6 +31,9 @@ KINDS = ("ridge", "groove", "auto")
 _ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
+_CLUSTERED = 1.6
+"""What a spacing by density is, in the median distance to the nearest point, where points lie in clusters or
+lines; on an even surface it is 0.5 (grids) to 1.25."""
 
 
 class NoRidgeError(ValueError):
@@ -193,7 +196,9 @@ def _with_distances(templates: tuple[Template, ...], grid: Grid) -> tuple[Templa
 def _spacing(grid: Grid, pick: Array) -> float:
     """Median distance between neighbours near the pick: the same however the scan is turned.
 
-    Raises ValueError where points are repeated so often that no spacing can be told.
+    Where points lie in pairs, clusters or lines, that tells nothing of how far they are from such of others:
+    then it is what points strewn as densely over a surface have. Raises ValueError where points are repeated
+    so often that no spacing can be told.
     """
     near = nearest(grid, pick[None], min(_NEAR, len(grid.points)))[1][0]
     apart = nearest_distances(grid, near, 2)[:, 1]
@@ -202,7 +207,10 @@ def _spacing(grid: Grid, pick: Array) -> float:
         raise ValueError(
             "scan: expected points that lie apart, got most of them repeated; drop the repeated ones"
         )
-    return spacing
+    if len(near) < _NEAR:
+        return spacing
+    strewn = 0.5 * float(np.linalg.norm(near - pick, axis=1).max()) * np.sqrt(np.pi / _NEAR)
+    return strewn if strewn > _CLUSTERED * spacing else spacing
 
 
 def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.held_ends import same_ridge, windows
 from ridgefeature.joint import Joint
 from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.path_frame import NODES_A_WIDTH
@@ -42,17 +43,6 @@ _LIKELY = 6.0
 _NEARLY = 0.3
 """Widths by which a known end may lie too far out."""
 _ANYTHING = 3.84
-_MISFIT = 2.5
-"""Mean squared distance of points, in that usual, above which a stretch may be something else."""
-_LEAST_NOISE = 0.02
-"""Distance of points, in heights, that a section may always miss by."""
-_MARGIN = 2
-"""Stretches at the very end that are not looked at: they may lie beyond it."""
-_OTHER, _LEAST_PART = 3.5, 0.15
-"""It is, where that times the growth of height or width, in those of the stretch before, is more; or where
-the height, in those, is less."""
-_STRETCH, _LATEST = 3, 4
-"""Widths of the stretch before, and of the last part of a ridge that is looked at."""
 _FADED = 0.5
 """Height at an end, in usual heights, below which the ridge fades there."""
 _FADING, _SLACK = 0.25, 0.2
@@ -70,7 +60,7 @@ def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
     known = [C, E, W]
     goal = joint.goal - np.einsum("nij,nj->ni", joint.matrix[:, :, known], terms[:, known])
     m = joint.matrix[:, _BASE_AND_HEIGHT][:, :, _BASE_AND_HEIGHT]
-    m, goal = _windows(m, stretches), _windows(goal[:, _BASE_AND_HEIGHT], stretches)
+    m, goal = windows(m, stretches), windows(goal[:, _BASE_AND_HEIGHT], stretches)
     sizes = np.sqrt(np.maximum(np.einsum("nii->ni", m[:, :2, :2]), 1e-300))
     scaled = m[:, :2, :2] / (sizes[:, :, None] * sizes[:, None]) + 1e-9 * np.eye(2)
     cross = m[:, :2, 2] / sizes
@@ -80,12 +70,6 @@ def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
     told = left > 1e-6 * m[:, 2, 2]
     height = np.where(told, pull / np.where(told, left, 1.0), 0.0)
     return np.where(told, height * pull, 0.0), height
-
-
-def _windows(values: Array, count: int) -> Array:
-    """Sums over all runs of `count` rows."""
-    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
-    return np.asarray(total[count:] - total[:-count])
 
 
 def ends_of(
@@ -123,43 +107,16 @@ def _end_of(joint: Joint, shown: tuple[Array, ...], start: float, end: float, ah
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
     inside = (path.at >= start) & (path.at <= end)
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
-    count = _windows(joint.counts, near) / _windows(path.width[1:] ** 2, near)
+    count = windows(joint.counts, near) / windows(path.width[1:] ** 2, near)
     dense = count > _DENSE * np.median(count[inside[:-near]])
     found, height, half, above = shown
     half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
     seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
     k = _end(seen, height, dense, joint.terms[:, H], high, one, near, ahead * one + near)
     end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
-    least = (_LEAST_NOISE * float(np.median(np.abs(path.height[inside]))) / joint.noise.scale) ** 2
     high = int(np.searchsorted(path.at, end, "right")) - 1
-    k = _same_ridge(joint.misfit, joint.terms, least, low, high)
+    k = same_ridge(joint, low, high)
     return end if k == high else float(path.at[k])
-
-
-def _same_ridge(misfit: Array, terms: Array, least: float, start: int, end: int) -> int:
-    """The node up to which a ridge from `start` to `end` is the same one, looked at from its end.
-
-    Where it runs into something else (a blob, a body, another ridge) its points no longer fit, and height or
-    width leave what the stretch before showed. What fits is the ridge, however it grows or fades.
-    """
-    half, back = NODES_A_WIDTH // 2, _STRETCH * NODES_A_WIDTH
-    sums = _windows(misfit, half)
-    noise = sums[:, 1] / np.maximum(sums[:, 0], 1.0)
-    usual = max(float(np.median(noise[start : max(end - half, start) + 1])), least)
-    cut, other = end, False
-    for k in range(end - half - _MARGIN, max(start + NODES_A_WIDTH, end - _LATEST * NODES_A_WIDTH), -1):
-        far = float(noise[k]) / usual
-        before = terms[max(start, k - half - back) : k - half + 1]
-        if far < _MISFIT or len(before) < NODES_A_WIDTH:
-            other = False
-            continue
-        height, width = (
-            float(np.median(np.abs(terms[k : k + half + 1, x])) / np.median(np.abs(before[:, x])))
-            for x in (H, W)
-        )
-        other = other or far * (max(height, width) - 1.0) > _OTHER or height < _LEAST_PART
-        cut = k + half // 2 if other else cut
-    return cut
 
 
 def _end(

@@ -12,7 +12,7 @@ from oracles import window_on
 import ridgefeature as rf
 from ridgefeature.continuation import FLAT, risen
 from ridgefeature.march import Track
-from ridgefeature.section import Section, cosine, plateau
+from ridgefeature.section import Section, cosine, dome, plateau
 from ridgefeature.settle import settle
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
@@ -96,6 +96,44 @@ def test_a_ridge_ends_where_it_runs_into_a_blob(seed, rise):
     assert 34 < high < 44
     assert found.height.max() < 1.3 * H
     assert np.median(found.half_height_width) == pytest.approx(0.496 * W, rel=0.1)
+
+
+def blobbed(seed: int, rise: float, size: float, strays: int, section: Section, noise: float) -> np.ndarray:
+    """A ridge along x from -20 to 42 that ends in a blob no wider than itself, which casts a shadow."""
+    places = plane(seed, (-30, 60), (-15, 15))
+    x, y = places.T
+    blob = rise * H * np.exp(-0.5 * ((x - 44) ** 2 + y**2) / size**2)
+    z = np.maximum(np.where((x > -20) & (x < 42), H * section(y / W), 0.0), blob)
+    behind = x - 44 - 0.3 * size
+    seen = ~((behind > 0) & (behind < 3 * size) & (np.abs(y) < 1.2 * size))
+    random = np.random.default_rng(seed + 1)
+    points = np.column_stack([places, z])[seen]
+    odd = np.column_stack(
+        [random.uniform(low, high, strays) for low, high in ((42, 47), (-2, 2), (H, 3 * H))]
+    )
+    return np.vstack([points + random.normal(0, noise, points.shape), odd])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("rise", "size", "strays", "section", "noise"),
+    [
+        (1.7, 1.5, 0, plateau(), 0.02),
+        (2.0, 1.5, 20, plateau(), 0.02),
+        (1.8, 2.0, 20, plateau(), 0.01),
+        (1.6, 2.0, 20, dome(), 0.02),
+    ],
+)
+def test_an_end_does_not_run_up_a_blob_nor_beyond_its_points(seed, rise, size, strays, section, noise):
+    points = blobbed(seed, rise, size, strays, section, noise)
+    found = rf.register(points, at=(0.0, 0.0, H))
+    low, high = np.sort(found.spine[[0, -1], 0])
+    assert abs(low + 20) < 0.5 * W
+    assert 36 < high < 48
+    assert found.height.max() < 1.25 * H
+    end = found.end_interval[int(np.argmax(found.spine[[0, -1], 0]))]
+    at = found.length if found.spine[-1, 0] > found.spine[0, 0] else 0.0
+    assert end[0] <= at <= end[1]
 
 
 @pytest.mark.parametrize(("slope", "over"), [(1.5, 25.0), (3.0, 10.0)])
