@@ -15,11 +15,10 @@ from ridgefeature.path_frame import PathFrame, wanted_differences
 from ridgefeature.section import Section
 from ridgefeature.smearing import log_likelihood, smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
+from ridgefeature.template import STEEP
 
 Array = NDArray[np.float64]
 
-_STEEP = 0.4
-"""Height by width from which on it matters how a fit begins."""
 _NEXT_MIXTURE = 3
 _ROUNDS, _LAST_ROUNDS = 2, 4
 """In which weights of penalties become likelier: few of them as long as the terms are not known well."""
@@ -82,7 +81,7 @@ def task_of(some: Array, path: PathFrame, flat: bool) -> Task:
 def is_steep(path: PathFrame) -> bool:
     """Whether flanks rise so much that a fit must begin near them."""
     height, width = _sizes(path)
-    return height >= _STEEP * width
+    return height >= STEEP * width
 
 
 def _sizes(path: PathFrame) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from ridgefeature.march import Track
 from ridgefeature.section import REACH, SECTIONS, Section, bell, plateau, uniform_basis
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, misfit_scale, settle, settle_base
-from ridgefeature.template import Template
+from ridgefeature.template import STEEP, Template
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -24,8 +24,6 @@ _MOST = 2000
 _PROBES = 6
 _SMALLEST_SHIFT = 0.01
 _MUCH_BETTER = 0.8
-_STEEP = 0.4
-"""Height of a bell, in its widths, from which on the march may do better with another section."""
 _LEAST_NOISE = 0.02
 """Least noise scale, in parts of the height, by which the first template's section is judged."""
 _DOUBT = 6.0
@@ -51,7 +49,7 @@ def march_section(window: Window, first: Template, settings: Settings) -> Templa
     Distances count both ways: a bell on steep flanks comes out too wide, or as a spike whose top no point is
     near to.
     """
-    if settings.section != "auto" or settings.measure == "M" or abs(first.height) < _STEEP * first.width:
+    if settings.section != "auto" or settings.measure == "M" or abs(first.height) < STEEP * first.width:
         return first
     points = window(first)
     steep = improve(window, with_section(first, plateau()), settings)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
-from ridgefeature.guess import Hints, guess
+from ridgefeature.guess import guess
 from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, resettled
 from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
@@ -20,6 +20,7 @@ from ridgefeature.rings import CLOSED, ring_or_not
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
+from ridgefeature.starts import Hints
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.valley import fitted_over_ground

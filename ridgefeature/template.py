@@ -13,6 +13,9 @@ from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
 
+STEEP = 0.4
+"""Height, in widths, from which on flanks are steep: a fit must begin near them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Template:

@@ -91,8 +91,8 @@ def test_modules_import_each_other_without_cycles():
 
 LAYERS = [
     ["basis"], ["bspline"], ["section"], ["template", "scan", "grid"], ["window", "distance"],
-    ["optimise"], ["improve"], ["guess", "march"], ["ends"], ["settle"], ["stations", "merge"], ["base"],
-    ["on_base", "fitting"], ["ridge"], ["registration"],
+    ["optimise"], ["improve"], ["starts", "march"], ["guess"], ["ends"], ["settle"], ["stations", "merge"],
+    ["base"], ["on_base", "fitting"], ["ridge"], ["registration"],
 ]  # fmt: skip
 
 

@@ -20,8 +20,9 @@ from oracles import (
 
 import ridgefeature as rf
 from ridgefeature.continuation import append
-from ridgefeature.guess import Hints, guess
+from ridgefeature.guess import guess
 from ridgefeature.march import march, march_one_way, reverse
+from ridgefeature.starts import Hints
 from ridgefeature.synthetic import Spiral
 from ridgefeature.template import Template
 
