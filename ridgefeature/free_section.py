@@ -31,7 +31,7 @@ _FOOT_STD = 0.037
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
 _FOOT_BLUR = 2.0
 """Of the same, in deviations of the noise that smears it."""
-_HALF_BLUR = 0.18
+_HALF_BLUR = 0.2
 """What that adds to the width at half height: how noise and points lie there is not known well."""
 _TOP = 0.95
 """The apex is midway between the places of this height."""

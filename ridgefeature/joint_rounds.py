@@ -148,10 +148,12 @@ def _linearised(
     matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
-    if points is not some:
-        off, far = offsets(points, terms, seen, scale)
+    if state.fit is None:
+        return matrix, right, noise, gain, np.ones(len(matrix))
+    off, far = offsets(points, terms, seen, scale)
     shares = 1.0 / (1.0 + density * np.exp(np.minimum(0.5 * (far / scale) ** 2, 50.0)))
-    return matrix, right, noise, gain, inflation_along(points, terms, off, shares, scale)
+    local = inflation_along(points, terms, off, shares, scale, state.fit.smooth.freedom)
+    return matrix, right, noise, gain, local
 
 
 def _by_foot_points(

@@ -105,12 +105,15 @@ def _evenness(points: Array, terms: Array, section: Section, noise: float) -> fl
     return float(np.clip((found - on_base) / max(on_surface - on_base, 1e-12), 0.0, 1.0))
 
 
-def inflation_along(points: Array, terms: Array, distances: Array, shares: Array, scale: float) -> Array:
+def inflation_along(
+    points: Array, terms: Array, distances: Array, shares: Array, scale: float, freedom: float
+) -> Array:
     """The same (n - 1,) of each stretch, by sums over narrow strips beside each other along the ridge.
 
     points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; distances (m,) from where points
-    are expected; shares (m,): chance that each is no stray. Points of one scan line may have an error in
-    common: where such lines run along the ridge their sums tell far less than so many points would.
+    are expected; shares (m,): chance that each is no stray; freedom: of the fit whose misfit that is. Points
+    of one scan line may have an error in common: where such lines run along the ridge their sums tell far
+    less than so many points would.
     """
     nodes = np.arange(len(terms))
     middle, width = (np.interp(points[:, 0], nodes, terms[:, k]) for k in (E, W))
@@ -126,7 +129,7 @@ def inflation_along(points: Array, terms: Array, distances: Array, shares: Array
     )
     told = (counts >= _FEW) & (squares > 0)
     seen = np.where(told, sums**2 / np.where(told, squares, 1.0), 0.0).sum(axis=1)
-    free = np.maximum(told.sum(axis=1) - TERMS, 0.0)
+    free = np.maximum(told.sum(axis=1) - min(freedom / windows, TERMS), 0.0)
     seen = np.where(free > 0, seen, 0.0)
     if seen.sum() < free.sum() + _SURE * np.sqrt(2.0 * free.sum()):
         return np.ones(len(terms) - 1)

@@ -28,6 +28,8 @@ class Smooth:
     covariance: Floats
     weights: Floats
     """(6,) of the penalties."""
+    freedom: float
+    """How many coefficients the data tell, in all."""
 
     def deviations(self, first: NDArray[np.intp], basis: Floats, term: int) -> Floats:
         """Standard deviations (k,) of one term where the basis functions are `basis` (k, 4)."""
@@ -40,7 +42,7 @@ class Smooth:
     def changed(self, change: Floats) -> Smooth:
         """The same for other terms, `change` (6, 6) times these."""
         covariance = changed_band(self.covariance, np.ascontiguousarray(change))
-        return Smooth(self.coefficients @ change.T, covariance, self.weights)
+        return Smooth(self.coefficients @ change.T, covariance, self.weights, self.freedom)
 
 
 def even_knots(n: int) -> Floats:
@@ -72,5 +74,7 @@ def smoothest(
     """
     first, basis = basis_at(n, places)
     band, right = assembled(matrix, goal, first, basis, n)
-    found, inverse, lam = most_likely(band, right, np.array(ORDERS), wanted, weights, rounds, float(doubted))
-    return Smooth(found, inverse, lam)
+    found, inverse, lam, freedom = most_likely(
+        band, right, np.array(ORDERS), wanted, weights, rounds, float(doubted)
+    )
+    return Smooth(found, inverse, lam, freedom)

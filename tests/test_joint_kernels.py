@@ -51,7 +51,7 @@ def test_smoothing_finds_straight_lines_exactly_and_what_is_wanted():
     line = places[:, None] * np.arange(1, TERMS + 1)
     band, right = assembled(goal, line, first, basis, n)
     wanted = np.zeros((TERMS, n))
-    found, _, weights = most_likely(band, right, np.array(ORDERS), wanted, np.ones(TERMS), 30)
+    found, _, weights, _ = most_likely(band, right, np.array(ORDERS), wanted, np.ones(TERMS), 30)
     values = (basis[:, :, None] * found[first[:, None] + np.arange(4)]).sum(axis=1)
     order_1 = ORDERS.index(1)
     others = [k for k in range(TERMS) if k != order_1]
@@ -68,7 +68,7 @@ def test_the_smoothness_is_that_of_the_data():
     curve = np.sin(places / 4)
     matrix = np.tile(100.0 * np.eye(TERMS), (m, 1, 1))
     goal = 100.0 * (curve[:, None] + rng.normal(0, 0.1, (m, TERMS)))
-    found, inverse, _ = most_likely(
+    found, inverse, _, freedom = most_likely(
         *assembled(matrix, goal, first, basis, n),
         np.array(ORDERS),
         np.zeros((TERMS, n)),
@@ -78,6 +78,7 @@ def test_the_smoothness_is_that_of_the_data():
     values = (basis * found[first[:, None] + np.arange(4), H]).sum(axis=1)
     assert np.sqrt(np.mean((values - curve) ** 2)) < 0.1 * np.sqrt(n / m)
     assert (inverse[:, 0] > 0).all()
+    assert 5 * TERMS < freedom < 0.6 * TERMS * n, "one and a half waves are told, not every coefficient"
 
 
 def straight(n: int = 21) -> tuple[np.ndarray, ...]:

@@ -8,6 +8,7 @@ from ridgefeature.noise import inflation_along
 from ridgefeature.path_frame import NODES_A_WIDTH
 
 NODES, POINTS, SHARE, LINES = 201, 12_000, 0.3, 0.05
+FREEDOM = TERMS * (NODES // NODES_A_WIDTH)
 """SHARE: of the variance that a scan line has in common; LINES: their distance in widths."""
 
 
@@ -34,7 +35,7 @@ def points(lines: str, seed: int) -> np.ndarray:
 
 
 def inflation(scan: np.ndarray, shares: float = 1.0) -> np.ndarray:
-    return inflation_along(scan, terms(), scan[:, 2], np.full(len(scan), shares), 1.0)
+    return inflation_along(scan, terms(), scan[:, 2], np.full(len(scan), shares), 1.0, FREEDOM)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -65,8 +66,10 @@ def test_strays_and_units_do_not_count():
     stray = np.array([[100.0, 0.3, 50.0]])
     with_stray = np.concatenate([scan, stray])
     shares = np.append(np.ones(len(scan)), 0.0)
-    assert np.allclose(inflation_along(with_stray, terms(), with_stray[:, 2], shares, 1.0), found, rtol=0.02)
+    assert np.allclose(
+        inflation_along(with_stray, terms(), with_stray[:, 2], shares, 1.0, FREEDOM), found, rtol=0.02
+    )
     longer = terms()
     longer[:, [H, W]] *= 1000
     big = scan * (1.0, 1000.0, 1000.0)
-    assert np.allclose(inflation_along(big, longer, big[:, 2], np.ones(len(big)), 1000.0), found)
+    assert np.allclose(inflation_along(big, longer, big[:, 2], np.ones(len(big)), 1000.0, FREEDOM), found)

@@ -119,8 +119,9 @@ def most_likely(
     weights: Floats,
     rounds: int,
     doubted: float = 1.0,
-) -> tuple[Floats, Floats, Floats]:
-    """Coefficients (n, 6), band of their covariance (6 n, 24) and weights (6,), most likely together.
+) -> tuple[Floats, Floats, Floats, float]:
+    """Coefficients (n, 6), band of their covariance (6 n, 24) and weights (6,), most likely together; and how
+    many coefficients the data tell, in all.
 
     wanted (6, n): of the differences of each term; weights: to begin with. There are always as many
     rounds: stopping early would let rounding decide on the result. doubted: as for `_next_weight`.
@@ -134,7 +135,7 @@ def most_likely(
         least[k] = _LEAST_RIDGE * size + 1e-300
         most[k] = _HARDEST * size + 1e-290
     lam = np.minimum(weights, most)
-    found, inverse = np.zeros(TERMS * n), np.zeros_like(band)
+    found, inverse, freedom = np.zeros(TERMS * n), np.zeros_like(band), 0.0
     for _ in range(rounds):
         whole, pull = band.copy(), right.copy()
         for k in range(TERMS):
@@ -147,9 +148,11 @@ def most_likely(
             continue
         found = solve(factored, pull)
         inverse = inverse_band(factored)
+        freedom = 0.0
         for k in range(TERMS):
+            freedom += orders[k] + _free(inverse, k, orders[k], lam[k])
             lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k], doubted), most[k])
-    return found.reshape(n, TERMS), inverse, lam
+    return found.reshape(n, TERMS), inverse, lam, freedom
 
 
 @njit(**OPTIONS)
