@@ -90,13 +90,15 @@ def fit_whole(
     rounds: int = 3,
     flat: bool = False,
     most: int = MOST_POINTS,
+    shared: bool = False,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     before: an earlier fit, whose noise and smoothness are taken to begin with; None: there was none, and the
     section may be far off. rounds: at most, of which the last does not change the section any
     more; 0: only how a steep one begins. flat: the
-    base stays as curved across as the path has it. most: about as many points are looked at.
+    base stays as curved across as the path has it. most: about as many points are looked at. shared: in the
+    last round errors that points have in common are looked for.
     """
     beside = settings.flank * (_BESIDE if is_steep(path) else 1.0)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
@@ -111,7 +113,7 @@ def fit_whole(
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = improved(task, points if last else some, state, left)
+        state = improved(task, points if last else some, state, left, shared=shared and last)
         if last or state is None:
             break
         if shaping:
@@ -129,7 +131,10 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
     if before is None:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
         return State(terms, section, first_noise(task.some, terms, section, h, w), weights)
-    return State(terms, section, before.noise, before.smooth.weights)
+    if before.path is not path:
+        return State(terms, section, before.noise, before.smooth.weights)
+    known = before.smooth.weights, before.inflation, before.smooth.freedom
+    return State(before.terms, section, before.noise, *known)
 
 
 def _reshaped(task: Task, state: State) -> State:

@@ -44,6 +44,8 @@ class State:
     noise: Noise
     weights: Array
     inflation: float = 1.0
+    freedom: float = 0.0
+    """How many coefficients the fit before told."""
     fit: Fit | None = None
     """None before the first round."""
 
@@ -90,11 +92,14 @@ def _sizes(path: PathFrame) -> tuple[float, float]:
     return float(np.median(known)) if len(known) else width, width
 
 
-def improved(task: Task, points: Array, state: State | None, left: int, near: bool = False) -> State | None:
+def improved(
+    task: Task, points: Array, state: State | None, left: int, near: bool = False, shared: bool = False
+) -> State | None:
     """All terms fitted again to points; None where nothing finite came of it.
 
     left: rounds still to come: until then what the terms miss is no stray yet. near: by the distances of the
-    points from the nearest places of the section (ridgefeature.foot_points), all of them of `task`.
+    points from the nearest places of the section (ridgefeature.foot_points), all of them of `task`. shared:
+    errors that points beside each other along the ridge have in common are looked for.
     """
     if state is None:
         return None
@@ -103,12 +108,13 @@ def improved(task: Task, points: Array, state: State | None, left: int, near: bo
     found = (
         _by_foot_points(points, state, *scales) if near else _linearised(points, task.some, state, *scales)
     )
-    matrix, goal, noise, gain, local = found
+    matrix, goal, noise, gain = found
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
-    known = gain / np.maximum(inflation, local)
+    local = _in_common(points, state, noise) if shared else np.ones(len(matrix))
+    known, inflation = gain / np.maximum(inflation, local), max(inflation, float(np.median(local)))
     matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
     if task.flat:
         _fix(matrix, goal, C)
@@ -121,7 +127,8 @@ def improved(task: Task, points: Array, state: State | None, left: int, near: bo
     if not np.isfinite(terms).all():
         return None
     terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-    return State(terms, state.section, noise, smooth.weights, inflation, Fit(smooth, matrix, goal))
+    fit = Fit(smooth, matrix, goal)
+    return State(terms, state.section, noise, smooth.weights, inflation, smooth.freedom, fit)
 
 
 def chance(points: Array, state: State) -> float:
@@ -134,7 +141,7 @@ def chance(points: Array, state: State) -> float:
 
 def _linearised(
     points: Array, some: Array, state: State, least: float, more: float
-) -> tuple[Array, Array, Noise, float, Array]:
+) -> tuple[Array, Array, Noise, float]:
     """Normal equations of all stretches for changes of the terms, noise, what makes them a likelihood.
 
     least: of the noise; more: by how much the least scale is more, from which on a distance tells a stray.
@@ -148,17 +155,20 @@ def _linearised(
     matrix, right, sums = information(points, terms, seen, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
-    if state.fit is None:
-        return matrix, right, noise, gain, np.ones(len(matrix))
-    off, far = offsets(points, terms, seen, scale)
-    shares = 1.0 / (1.0 + density * np.exp(np.minimum(0.5 * (far / scale) ** 2, 50.0)))
-    local = inflation_along(points, terms, off, shares, scale, state.fit.smooth.freedom)
-    return matrix, right, noise, gain, local
+    return matrix, right, noise, gain
+
+
+def _in_common(points: Array, state: State, noise: Noise) -> Array:
+    """Variance of sums over the points of each stretch, by that of independent noise."""
+    terms, scale = state.terms, noise.scale
+    off, far = offsets(points, terms, smear(state.section, terms, noise.blur, noise.even).told, scale)
+    shares = 1.0 / (1.0 + noise.density * np.exp(np.minimum(0.5 * (far / scale) ** 2, 50.0)))
+    return inflation_along(points, terms, off, shares, scale, state.freedom)
 
 
 def _by_foot_points(
     points: Array, state: State, least: float, more: float
-) -> tuple[Array, Array, Noise, float, Array]:
+) -> tuple[Array, Array, Noise, float]:
     """The same by distances from the nearest places of the section."""
     terms, noise = state.terms, state.noise
     off, rows = distances(points, terms, state.section)
@@ -168,7 +178,7 @@ def _by_foot_points(
     matrix, right, sums = foot_information(points, len(terms) - 1, off, rows, scale, density)
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
-    return matrix, right, noise, gain, np.ones(len(matrix))
+    return matrix, right, noise, gain
 
 
 def _fix(matrix: Array, goal: Array, term: int) -> None:

@@ -46,6 +46,8 @@ class Refit:
     end_interval: Array | None = None
     """(2, 2) as in Ridge."""
     closed: bool = False
+    flat: bool = False
+    """Whether the base was taken for flat across."""
 
 
 def refitted(
@@ -63,10 +65,24 @@ def refitted(
     """
     found, sound = _refitted(grid, stations, section, closed, open_ends, settings)
     core = None if sound or closed else core_of(stations)
-    if core is None:
+    if core is not None:
+        again, sound = _refitted(grid, core, section, closed, (True, True), settings)
+        found = again if sound else found
+    return _as_known(grid, found, settings) if sound else found
+
+
+def _as_known(grid: Grid, found: Refit, settings: Settings) -> Refit:
+    """The same ridge as smooth, and as sure, as errors that its points have in common leave it.
+
+    Only now: an end that runs into something else is told by terms that follow its points.
+    """
+    joint, kept = found.joint, replace(settings, section="bell")  # the section as it is
+    if joint is None:
         return found
-    again, sound = _refitted(grid, core, section, closed, (True, True), settings)
-    return again if sound else found
+    again = fit_whole(grid, joint.path, joint.section, kept, joint, 1, found.flat, MOST_POINTS, True)
+    if again is None or not _sound(again):
+        return found
+    return replace(found, joint=again, stations=stations_of(again, len(found.stations.arc_length), settings))
 
 
 def _refitted(
@@ -95,7 +111,7 @@ def _refitted(
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
         return Refit(laid, first, intervals, closed), False
-    found = Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed)
+    found = Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed, flat)
     return found if closed else _held(grid, found, open_ends, settings, flat), True
 
 
@@ -120,7 +136,7 @@ def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Sett
             intervals[:, 0] = np.minimum(intervals[:, 0], (0.0, length))
             intervals[:, 1] = np.maximum(intervals[:, 1], (0.0, length))
             intervals.setflags(write=False)
-        found = Refit(stations_of(again, count, settings), again, intervals)
+        found = Refit(stations_of(again, count, settings), again, intervals, False, flat)
     return found
 
 

@@ -210,7 +210,7 @@ def _spacing(grid: Grid, pick: Array) -> float:
         )
     if len(near) < _NEAR:
         return spacing
-    strewn = 0.5 * float(np.linalg.norm(near - pick, axis=1).max()) * np.sqrt(np.pi / _NEAR)
+    strewn = 0.5 * float(np.linalg.norm(near - near[0], axis=1).max()) * np.sqrt(np.pi / _NEAR)
     return strewn if strewn > _CLUSTERED * spacing else spacing
 
 

@@ -106,7 +106,7 @@ def _normals(points: Array) -> Array:
     near = nearest(build_grid(points), points, _AROUND)[1]
     near = near - near.mean(axis=1, keepdims=True)
     extents, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
-    flat = extents[:, 0] / extents.sum(axis=1)
+    flat = extents[:, 0] / np.maximum(extents.sum(axis=1), 1e-300)
     return np.asarray(axes[flat <= np.quantile(flat, _FLATTEST), :, 0])
 
 
