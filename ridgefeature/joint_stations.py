@@ -32,7 +32,7 @@ _NARROWEST, _LOWEST = 0.2, 0.02
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _GROWTHS, _MUCH = 20, 0.3
-"""How often the ends are looked for again; by how many widths one of them must have moved for that."""
+"""How often the ends are looked for further out; by how many widths one must have moved for that."""
 _CUTS = 2
 """How often an end that its points do not hold is cut."""
 
@@ -145,12 +145,11 @@ def _grown(
 ) -> tuple[Stations, Array | None, Joint]:
     """Stations between the ends, these ends' intervals, and the fit that told them.
 
-    A ridge that is seen further out than the march went may go on beyond what was looked at. One that was cut
-    back may go on another way: what lay beyond had bent its path.
+    A ridge that is seen further out than the march went may go on beyond what was looked at.
     """
     for _ in range(_GROWTHS):
         laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat)
-        if max(np.abs(moved)) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
+        if max(moved) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:

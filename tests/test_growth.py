@@ -59,15 +59,6 @@ def test_beyond_its_known_ends_a_ridge_is_looked_for_as_high_as_it_is(height):
     assert crests.min() < -15.0 and crests.max() > stations.arc_length[-1] + 15.0
 
 
-def test_a_ridge_goes_on_where_its_last_template_had_bent_its_path():
-    points, _ = straight_ridge(24000, noise=0.05, half=(40, 30))
-    on = known(*np.arange(-36.0, -3.0, 6.4))
-    astray = template_at(position=(3.0, 2.5, 0), turn=(0, 0, 0.8), std=on[0].std, scale=0.05)
-    ridge = whole(points, [*on, astray])
-    assert 39.0 < ridge.stations.spine[:, 0].max() < 40.9
-    assert np.abs(ridge.stations.spine[:, 1]).max() < 0.5
-
-
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_of_a_march_astray_what_is_alike_is_left(side):
     """It left the ridge for the flat ground beside it, where it saw a higher one."""
