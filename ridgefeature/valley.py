@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ridgefeature.grid import Grid
-from ridgefeature.joint_stations import Refit, refitted
+from ridgefeature.refit import Refit, refitted
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations

@@ -8,8 +8,8 @@ from oracles import straight_ridge, template_at
 
 import ridgefeature as rf
 from ridgefeature.grid import build_grid
-from ridgefeature.joint_stations import Refit, refitted
 from ridgefeature.path_frame import path_frame, points_along
+from ridgefeature.refit import Refit, refitted
 from ridgefeature.section import bell
 from ridgefeature.stations import in_line, lay_out
 from ridgefeature.template import Template

@@ -11,9 +11,9 @@ from oracles import SPIRAL, apex, spiral_points, spiral_ridge
 import ridgefeature as rf
 from ridgefeature.free_section import trimmed
 from ridgefeature.grid import build_grid
-from ridgefeature.joint_stations import refitted
 from ridgefeature.kernels.strip import rectified
 from ridgefeature.path_frame import path_frame, points_along
+from ridgefeature.refit import refitted
 from ridgefeature.section import Section, bell, cosine, plateau
 from ridgefeature.settings import Settings
 from ridgefeature.stations import lay_out

@@ -10,9 +10,9 @@ from ridgefeature.foot_points import distances, information
 from ridgefeature.grid import build_grid
 from ridgefeature.joint import fit_whole
 from ridgefeature.joint_rounds import is_steep, task_of
-from ridgefeature.joint_stations import refitted
 from ridgefeature.kernels.strip import TERMS, A, C, E, H, W
 from ridgefeature.path_frame import path_frame
+from ridgefeature.refit import refitted
 from ridgefeature.section import bell, box, plateau
 from ridgefeature.smearing import log_likelihood
 from ridgefeature.stations import Stations

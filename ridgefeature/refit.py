@@ -1,0 +1,219 @@
+"""A ridge fitted as a whole: begun, looked for beyond its ends, cut where its points do not hold it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.astray import SHORTEST, core_of
+from ridgefeature.grid import Grid
+from ridgefeature.held_ends import held
+from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
+from ridgefeature.joint_rounds import is_steep
+from ridgefeature.joint_stations import stations_of
+from ridgefeature.kernels.strip import A, C, E, H
+from ridgefeature.own_beginning import as_ring
+from ridgefeature.path_frame import PathFrame, path_frame
+from ridgefeature.section import Section
+from ridgefeature.settings import Settings
+from ridgefeature.stations import Stations
+from ridgefeature.whole_ends import BEYOND, end_interval, ends_of
+
+Array = NDArray[np.float64]
+
+_BENT = 4.5
+"""Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
+_FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
+_FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
+_GROWTHS, _MUCH = 20, 0.3
+"""How often the ends are looked for further out; by how many widths one must have moved for that."""
+_CUTS = 2
+"""How often an end that its points do not hold is cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """Stations of a ridge fitted as a whole, and the fit; None where there are too few points for one."""
+
+    stations: Stations
+    joint: Joint | None = None
+    end_interval: Array | None = None
+    """(2, 2) as in Ridge."""
+    closed: bool = False
+    flat: bool = False
+    """Whether the base was taken for flat across."""
+
+
+def refitted(
+    grid: Grid,
+    stations: Stations,
+    section: Section,
+    closed: bool,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+) -> Refit:
+    """The stations fitted again as a whole; as they were where there are too few points.
+
+    open_ends: which ends may move, further out or back. Where no sound fit goes along all stations, the march
+    went astray: then along those that are alike.
+    """
+    found, sound = _refitted(grid, stations, section, closed, open_ends, settings)
+    core = None if sound or closed else core_of(stations)
+    if core is not None:
+        again, sound = _refitted(grid, core, section, closed, (True, True), settings)
+        found = again if sound else found
+    return _as_known(grid, found, settings) if sound else found
+
+
+def _as_known(grid: Grid, found: Refit, settings: Settings) -> Refit:
+    """The same ridge as smooth, and as sure, as errors that its points have in common leave it.
+
+    Only now: an end that runs into something else is told by terms that follow its points.
+    """
+    joint, kept = found.joint, replace(settings, section="bell")  # the section as it is
+    if joint is None:
+        return found
+    again = fit_whole(grid, joint.path, joint.section, kept, joint, 1, found.flat, MOST_POINTS, True)
+    if again is None or not _sound(again):
+        return found
+    return replace(found, joint=again, stations=stations_of(again, len(found.stations.arc_length), settings))
+
+
+def _refitted(
+    grid: Grid,
+    stations: Stations,
+    section: Section,
+    closed: bool,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+) -> tuple[Refit, bool]:
+    """The same of all these stations, and whether it is sound to the end."""
+    flat = settings.flat
+    stations, section = _upright(grid, stations, section, closed, settings, flat)
+    first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
+    if first is None:
+        return Refit(stations, closed=closed), False
+    if not stations.curvature.any() and first.bent < _BENT:
+        flat = True
+        first = first.without(C)
+    laid, intervals = stations_of(first, len(stations.arc_length), settings), None
+    if not closed and any(open_ends):
+        laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat)
+        ring = as_ring(laid)
+        if ring is not None:
+            laid, intervals, closed = ring, None, True
+    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
+    if joint is None:
+        return Refit(laid, first, intervals, closed), False
+    found = Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed, flat)
+    return found if closed else _held(grid, found, open_ends, settings, flat), True
+
+
+def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Settings, flat: bool) -> Refit:
+    """The open ridge cut at ends that its points do not hold, and fitted again without what lies beyond."""
+    for _ in range(_CUTS):
+        joint, stations = found.joint, found.stations
+        if joint is None:
+            break
+        start, end = held(joint, open_ends)
+        length = end - start
+        if length >= stations.arc_length[-1] or length < SHORTEST * float(np.median(stations.width)):
+            break
+        count = max(round(length / stations.arc_length[1]) + 1, 13)
+        laid = stations_of(joint, count, settings, (start, end))
+        again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
+        if again is None:
+            break
+        intervals = found.end_interval
+        if intervals is not None:
+            intervals = intervals - start
+            intervals[:, 0] = np.minimum(intervals[:, 0], (0.0, length))
+            intervals[:, 1] = np.maximum(intervals[:, 1], (0.0, length))
+            intervals.setflags(write=False)
+        found = Refit(stations_of(again, count, settings), again, intervals, False, flat)
+    return found
+
+
+def _grown(
+    grid: Grid, laid: Stations, joint: Joint, open_ends: tuple[bool, bool], settings: Settings, flat: bool
+) -> tuple[Stations, Array | None, Joint]:
+    """Stations between the ends, these ends' intervals, and the fit that told them.
+
+    A ridge that is seen further out than the march went may go on beyond what was looked at.
+    """
+    for _ in range(_GROWTHS):
+        laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat)
+        if max(moved) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
+            break
+        again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
+        if again is None:
+            break
+        joint, laid = again, stations_of(again, len(laid.arc_length), settings)
+    return laid, intervals, joint
+
+
+def _upright(
+    grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
+) -> tuple[Stations, Section]:
+    """Stations and section of a steep ridge as its fit begins: high flanks lean where the base is wrong."""
+    path = path_frame(stations, closed)
+    if not is_steep(path) or settings.section not in FOUND:
+        return stations, section
+    begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
+    if begun is None or not _sound(begun):
+        return stations, section
+    if not stations.curvature.any() and begun.bent < _BENT:
+        begun = begun.without(C)
+    return stations_of(begun, len(stations.arc_length), settings), begun.section
+
+
+def _fit(
+    grid: Grid, path: PathFrame, section: Section, settings: Settings, before: Joint | None, flat: bool
+) -> Joint | None:
+    """The whole fit along a path, if it is sound."""
+    rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if before is None else (_LAST_ROUNDS, MOST_POINTS)
+    joint = fit_whole(grid, path, section, settings, before, rounds, flat, most)
+    return joint if joint is not None and _sound(joint) else None
+
+
+def _between_ends(
+    grid: Grid,
+    stations: Stations,
+    joint: Joint,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+    flat: bool,
+) -> tuple[Stations, Array | None, tuple[float, float]]:
+    """The stations between the ends that all points along the path tell, and these ends' intervals; by how
+    much both ends moved out."""
+    length = float(stations.arc_length[-1])
+    far = [BEYOND * float(stations.width[k]) if open_ends[-k] else 0.0 for k in (0, -1)]
+    path = path_frame(stations, False, (far[0], far[1]))
+    fixed = replace(settings, section="bell")  # kept as it is
+    wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
+    if wide is None or not np.isfinite(wide.terms).all():
+        return stations, None, (0.0, 0.0)
+    start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead)
+    if end - start < SHORTEST * float(np.median(stations.width)):
+        return stations, None, (0.0, 0.0)
+    intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start
+    intervals[~np.array(open_ends)] = np.nan
+    intervals.setflags(write=False)
+    if (start, end) == (0.0, length):
+        return stations, intervals, (0.0, 0.0)
+    count = int(np.clip(round((end - start) / length * (len(stations.arc_length) - 1)) + 1, 13, 401))
+    return stations_of(wide, count, settings, (start, end)), intervals, (-start, end - length)
+
+
+def _sound(joint: Joint) -> bool:
+    """Whether a fit is still about the ridge that it began with."""
+    path, terms = joint.path, joint.terms
+    if not (np.isfinite(terms).all() and np.isfinite(joint.smooth.covariance).all()):
+        return False
+    aside = np.abs(terms[:, E]) < _FAR * path.width
+    level = np.abs(terms[:, A]) < _FAR * path.width + np.abs(path.height)
+    grown = terms[:, H] / np.where(path.height == 0, 1.0, path.height)
+    size = (grown > 1 / _GROWN) & (grown < _GROWN)
+    return float((aside & level & size).mean()) > _MOSTLY
