@@ -26,9 +26,13 @@ def registered(points: np.ndarray) -> rf.Ridge:
     return rf.register(points, at=at)
 
 
+def usual_std(in_common: float, along: bool) -> float:
+    """Of the height."""
+    ridges = [registered(scan(seed, in_common, along)) for seed in range(3)]
+    return float(np.mean([np.median(ridge.height_std) for ridge in ridges]))
+
+
 def test_bands_are_wider_than_those_of_independent_noise():
-    std = np.mean([np.median(ridge.height_std) for ridge in with_lines])
-    assert std > 1.4 * np.mean([np.median(registered(scan(seed, 0.0)).height_std) for seed in range(3)])
-    assert std > 1.2 * np.mean(
-        [np.median(registered(scan(seed, 0.6, False)).height_std) for seed in range(3)]
-    )
+    along = usual_std(0.6, along=True)
+    assert along > 1.4 * usual_std(0.0, along=True)
+    assert along > 1.2 * usual_std(0.6, along=False)
