@@ -69,6 +69,12 @@ class Joint:
         keep[term, term] = 0.0
         return replace(self, terms=self.terms @ keep, smooth=self.smooth.changed(keep))
 
+    def less_sure(self, inflation: float) -> Joint:
+        """The same where neighbouring points have so much in common, if that is more than was thought."""
+        growth = max(inflation / self.inflation, 1.0)
+        smooth = replace(self.smooth, covariance=growth * self.smooth.covariance)
+        return replace(self, smooth=smooth, inflation=growth * self.inflation)
+
     @property
     def bent(self) -> float:
         """The largest change of the base's curvature, in its standard deviations."""

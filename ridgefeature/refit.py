@@ -29,6 +29,9 @@ _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _GROWTHS, _MUCH = 20, 0.3
 """How often the ends are looked for further out; by how many widths one must have moved for that."""
+CORRELATED = 2.5
+"""Variance of sums over neighbouring points, by that of independent noise, beyond which a ridge or its ground
+is not of the shape that the model has."""
 _CUTS = 2
 """How often an end that its points do not hold is cut."""
 
@@ -70,7 +73,8 @@ def refitted(
 def _as_known(grid: Grid, found: Refit, settings: Settings) -> Refit:
     """The same ridge as smooth, and as sure, as errors that its points have in common leave it.
 
-    Only now: an end that runs into something else is told by terms that follow its points.
+    Only now: an end that runs into something else is told by terms that follow its points. Where most of the
+    points have much in common it is the ridge that is not of the model's shape: then its terms stay.
     """
     joint, kept = found.joint, replace(settings, section="bell")  # the section as it is
     if joint is None:
@@ -78,6 +82,8 @@ def _as_known(grid: Grid, found: Refit, settings: Settings) -> Refit:
     again = fit_whole(grid, joint.path, joint.section, kept, joint, 1, found.flat, MOST_POINTS, True)
     if again is None or not _sound(again):
         return found
+    if again.inflation > CORRELATED:
+        again = joint.less_sure(again.inflation)
     return replace(found, joint=again, stations=stations_of(again, len(found.stations.arc_length), settings))
 
 

@@ -7,16 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ridgefeature.grid import Grid
-from ridgefeature.refit import Refit, refitted
+from ridgefeature.refit import CORRELATED, Refit, refitted
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
 
 _DEEP = 0.1
 """Depth of a hollow base under the spine, below its feet and in heights, from which on it is in doubt."""
-_CORRELATED = 2.5
-"""Variance of sums over neighbouring points, by that of independent noise, beyond which the ground is not
-of the second degree that a base is."""
 _WORSE = 1.3
 """Noise on the level base, in that on the hollow one, beyond which this one stays."""
 _FLANK = 0.1
@@ -39,7 +36,7 @@ def fitted_over_ground(
     """
     told = closed, open_ends
     found = refitted(grid, stations, section, *told, settings)
-    if settings.flat or found.joint is None or found.joint.inflation < _CORRELATED or not _hollow(found):
+    if settings.flat or found.joint is None or found.joint.inflation < CORRELATED or not _hollow(found):
         return found
     near = replace(settings, base_chance=0.5, flank=min(_FLANK, settings.flank))
     level = refitted(grid, replace(stations, curvature=np.zeros(0)), section, *told, near)
