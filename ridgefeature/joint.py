@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +11,13 @@ from numpy.typing import NDArray
 from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
-from ridgefeature.kernels.strip import TERMS, C, E, H, W, offsets
+from ridgefeature.kernels.strip import TERMS, C, H, W, offsets, places_across
 from ridgefeature.noise import Noise, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped
-from ridgefeature.smearing import Smeared, smear
+from ridgefeature.smearing import Smeared
 from ridgefeature.smoothing import Smooth, basis_at
 from ridgefeature.steep_start import likeliest
 
@@ -47,6 +48,8 @@ class Joint:
     """A ridge fitted as a whole: terms (n, 6) at the nodes of its path, and how sure they are."""
 
     path: PathFrame
+    points: Array
+    """(m, 3) that it was fitted to, in path coordinates."""
     smooth: Smooth
     terms: Array
     section: Section
@@ -61,7 +64,14 @@ class Joint:
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
-    section_std: SectionStd
+
+    seen: Smeared
+    """The section as points so noisy show it."""
+
+    @cached_property
+    def section_std(self) -> SectionStd:
+        """What the section, the same along the whole ridge, adds to standard deviations."""
+        return section_std(_some(self.points), self.terms, self.seen, self.noise.told, self.inflation)
 
     def without(self, term: int) -> Joint:
         """The same where one term is 0."""
@@ -96,21 +106,19 @@ def fit_whole(
     rounds: int = 3,
     flat: bool = False,
     most: int = MOST_POINTS,
-    shared: bool = False,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     before: an earlier fit, whose noise and smoothness are taken to begin with; None: there was none, and the
     section may be far off. rounds: at most, of which the last does not change the section any
-    more; 0: only how a steep one begins. flat: the
-    base stays as curved across as the path has it. most: about as many points are looked at. shared: in the
-    last round errors that points have in common are looked for.
+    more; 0: only how a steep one begins. flat: the base stays as curved across as the path has it. most:
+    about as many points are looked at.
     """
     beside = settings.flank * (_BESIDE if is_steep(path) else 1.0)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
     if len(points) < _FEWEST:
         return None
-    some = points[:: 1 + len(points) // SOME_POINTS]
+    some = _some(points)
     shaping = settings.section in FOUND
     task = task_of(some, path, flat)
     state: State | None = _begun(task, section, before)
@@ -119,7 +127,7 @@ def fit_whole(
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = improved(task, points if last else some, state, left, shared=shared and last)
+        state = improved(task, points if last else some, state, left)
         if last or state is None:
             break
         if shaping:
@@ -127,7 +135,19 @@ def fit_whole(
             shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
-    return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit)
+    return None if state is None or state.fit is None else _joint(task, points, state, state.fit)
+
+
+def known_in_common(joint: Joint, flat: bool) -> Joint | None:
+    """The same fit to the same points where errors that those beside each other along the ridge have in
+    common are looked for; flat: as for `fit_whole`."""
+    task = task_of(_some(joint.points), joint.path, flat)
+    state = improved(task, joint.points, _begun(task, joint.section, joint), 0, shared=True)
+    return None if state is None or state.fit is None else _joint(task, joint.points, state, state.fit)
+
+
+def _some(points: Array) -> Array:
+    return points[:: 1 + len(points) // SOME_POINTS]
 
 
 def _begun(task: Task, section: Section, before: Joint | None) -> State:
@@ -145,29 +165,26 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
 
 def _reshaped(task: Task, state: State) -> State:
     """With a free section if it is better; on steep flanks only if the exact likelihood says so too."""
-    new = state.given(*shaped(task.some, state.terms, state.section, state.noise, state.inflation))
+    new = state.given(*shaped(task.some, state.terms, state.seen, state.noise, state.inflation))
     if new.section is state.section or not task.steep:
         return new
     return new if chance(task.some, new) > chance(task.some, state) else state
 
 
-def _joint(points: Array, some: Array, path: PathFrame, state: State, fit: Fit) -> Joint:
-    stretches = len(path.at) - 1
+def _joint(task: Task, points: Array, state: State, fit: Fit) -> Joint:
+    stretches = len(task.path.at) - 1
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches].astype(float)
-    terms, noise, inflation = state.terms, state.noise, state.inflation
-    seen = smear(state.section, terms, noise.blur, noise.even)
-    shape = section_std(some, terms, seen, noise.told, inflation)
-    misfit = _misfit(some, terms, seen, noise.scale)
-    told = fit.smooth, terms, state.section, fit.matrix, fit.goal
-    return Joint(path, *told, counts, misfit, noise, inflation, shape)
+    terms, noise = state.terms, state.noise
+    misfit = _misfit(task.some, terms, state.seen, noise.scale)
+    told = fit.smooth, terms, state.section, fit.matrix, fit.goal, counts, misfit
+    return Joint(task.path, points, *told, noise, state.inflation, state.seen)
 
 
 def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:
     """(n - 1, 3) as Joint.misfit has it."""
-    place = points[:, 0].astype(np.int64)
-    eta = (points[:, 1] - terms[place, E]) / terms[place, W]
+    eta = places_across(points, terms)
     on = np.abs(eta) < 0.5
-    place, eta = place[on], eta[on]
+    place, eta = points[on, 0].astype(np.int64), eta[on]
     off = offsets(points[on], terms, seen.told, scale)[0]
     far = np.minimum((off / max(scale, least_noise(terms))) ** 2, _FAR_OFF)
     top = (seen.section(eta) > _ON_TOP) & (far < _FAR_OFF)

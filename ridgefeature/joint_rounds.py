@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from ridgefeature.kernels.strip import C, W, information, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame, wanted_differences
 from ridgefeature.section import Section
-from ridgefeature.smearing import log_likelihood, smear
+from ridgefeature.smearing import Smeared, log_likelihood, smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
 from ridgefeature.template import STEEP
 
@@ -48,6 +49,11 @@ class State:
     """How many coefficients the fit before told."""
     fit: Fit | None = None
     """None before the first round."""
+
+    @cached_property
+    def seen(self) -> Smeared:
+        """The section as points so noisy show it."""
+        return smear(self.section, self.terms, self.noise.blur, self.noise.even)
 
     def lying(self, even: float) -> State:
         """With points that lie evenly over the base, 0, or over the surface, 1."""
@@ -147,7 +153,7 @@ def _linearised(
     least: of the noise; more: by how much the least scale is more, from which on a distance tells a stray.
     """
     terms, noise = state.terms, state.noise
-    seen = smear(state.section, terms, noise.blur, noise.even).told
+    seen = state.seen.told
     off, far = offsets(some, terms, seen, noise.scale)
     told = noise.scale, noise.strays, noise.span, more * least
     scale, strays, density = mixture(off, far, *told, _NEXT_MIXTURE)
@@ -161,7 +167,7 @@ def _linearised(
 def _in_common(points: Array, state: State, noise: Noise) -> Array:
     """Variance of sums over the points of each stretch, by that of independent noise."""
     terms, scale = state.terms, noise.scale
-    off, far = offsets(points, terms, smear(state.section, terms, noise.blur, noise.even).told, scale)
+    off, far = offsets(points, terms, state.seen.told, scale)
     shares = 1.0 / (1.0 + noise.density * np.exp(np.minimum(0.5 * (far / scale) ** 2, 50.0)))
     return inflation_along(points, terms, off, shares, scale, state.freedom)
 

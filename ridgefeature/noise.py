@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.strip import TERMS, E, H, W, mixture, offsets
+from ridgefeature.kernels.section_sums import strip_sums
+from ridgefeature.kernels.strip import TERMS, H, W, mixture, offsets, places_across
 from ridgefeature.path_frame import NODES_A_WIDTH
 from ridgefeature.section import Section
 from ridgefeature.smearing import smear
@@ -75,10 +76,8 @@ def first_noise(
 
 def blur_of(points: Array, terms: Array, distances: Array, scale: float, span: float, least: float) -> float:
     """The noise as points beyond the feet tell it, but no more than all of them do."""
-    every, nodes = 1 + len(points) // _ENOUGH, np.arange(len(terms))
-    points, distances = points[::every], distances[::every]
-    aside = np.abs(points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E]))
-    beyond = distances[aside > 0.5 * np.interp(points[:, 0], nodes, terms[:, W])]
+    every = 1 + len(points) // _ENOUGH
+    beyond = distances[::every][np.abs(places_across(points[::every], terms)) > 0.5]
     if len(beyond) < _FEWEST:
         return scale
     return min(mixture(beyond, np.abs(beyond), scale, _SOME_STRAYS, span, least, _FIRST_MIXTURE)[0], scale)
@@ -91,9 +90,7 @@ def _evenness(points: Array, terms: Array, section: Section, noise: float) -> fl
     def stretched(eta: Array) -> Array:
         return np.asarray(np.sqrt(1.0 + (h / w * section(eta, 1)) ** 2))
 
-    nodes = np.arange(len(terms))
-    width = np.interp(points[:, 0], nodes, terms[:, W])
-    eta = (points[:, 1] - np.interp(points[:, 0], nodes, terms[:, E])) / width
+    eta = places_across(points, terms)
     places = np.linspace(-1.0, 1.0, 401)
     dense = stretched(places)
     if noise > 0:
@@ -108,25 +105,19 @@ def _evenness(points: Array, terms: Array, section: Section, noise: float) -> fl
 def inflation_along(
     points: Array, terms: Array, distances: Array, shares: Array, scale: float, freedom: float
 ) -> Array:
-    """The same (n - 1,) of each stretch, by sums over narrow strips beside each other along the ridge.
+    """Variance of sums over points by that of independent noise, 1 or more, of each stretch (n - 1,).
+
+    Told by sums over narrow strips beside each other along the ridge, each a width long.
 
     points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; distances (m,) from where points
     are expected; shares (m,): chance that each is no stray; freedom: of the fit whose misfit that is. Points
     of one scan line may have an error in common: where such lines run along the ridge their sums tell far
     less than so many points would.
     """
-    nodes = np.arange(len(terms))
-    middle, width = (np.interp(points[:, 0], nodes, terms[:, k]) for k in (E, W))
-    strip = np.floor((points[:, 1] - middle) / (_STRIP * width)).astype(np.int64)
-    strip -= strip.min()
-    window = (points[:, 0] / NODES_A_WIDTH).astype(np.int64)
-    windows, strips = int(window.max()) + 1, int(strip.max()) + 1
-    psi = shares * distances / scale
-    place = window * strips + strip
-    sums, squares, counts = (
-        np.bincount(place, v, windows * strips).reshape(windows, strips)
-        for v in (psi, psi * psi, np.ones(len(psi)))
-    )
+    strips = np.floor(places_across(points, terms) / _STRIP).astype(np.int64)
+    at = (points[:, 0] / NODES_A_WIDTH).astype(np.int64)
+    sums, squares, counts = strip_sums(at, strips - strips.min(), shares * distances / scale)
+    windows = len(sums)
     told = (counts >= _FEW) & (squares > 0)
     seen = np.where(told, sums**2 / np.where(told, squares, 1.0), 0.0).sum(axis=1)
     free = np.maximum(told.sum(axis=1) - min(freedom / windows, TERMS), 0.0)

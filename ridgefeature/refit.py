@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from ridgefeature.astray import SHORTEST, core_of
 from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
-from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
+from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole, known_in_common
 from ridgefeature.joint_rounds import is_steep
 from ridgefeature.joint_stations import stations_of
-from ridgefeature.kernels.strip import A, C, E, H
+from ridgefeature.kernels.strip import A, C, E, H, W
 from ridgefeature.own_beginning import as_ring
 from ridgefeature.path_frame import PathFrame, path_frame
 from ridgefeature.section import Section
@@ -67,22 +67,22 @@ def refitted(
     if core is not None:
         again, sound = _refitted(grid, core, section, closed, (True, True), settings)
         found = again if sound else found
-    return _as_known(grid, found, settings) if sound else found
+    return _as_known(found, settings) if sound else found
 
 
-def _as_known(grid: Grid, found: Refit, settings: Settings) -> Refit:
+def _as_known(found: Refit, settings: Settings) -> Refit:
     """The same ridge as smooth, and as sure, as errors that its points have in common leave it.
 
     Only now: an end that runs into something else is told by terms that follow its points. Where most of the
     points have much in common it is the ridge that is not of the model's shape: then its terms stay.
     """
-    joint, kept = found.joint, replace(settings, section="bell")  # the section as it is
+    joint = found.joint
     if joint is None:
         return found
-    again = fit_whole(grid, joint.path, joint.section, kept, joint, 1, found.flat, MOST_POINTS, True)
+    again = known_in_common(joint, found.flat)
     if again is None or not _sound(again):
-        return found
-    if again.inflation > CORRELATED:
+        again = joint
+    elif again.inflation > CORRELATED:
         again = joint.less_sure(again.inflation)
     return replace(found, joint=again, stations=stations_of(again, len(found.stations.arc_length), settings))
 
@@ -95,10 +95,13 @@ def _refitted(
     open_ends: tuple[bool, bool],
     settings: Settings,
 ) -> tuple[Refit, bool]:
-    """The same of all these stations, and whether it is sound to the end."""
+    """The same of all these stations, and whether it is sound to the end.
+
+    If so, the stations are those that the last fit went along: where it leads is laid out once, at the end.
+    """
     flat = settings.flat
-    stations, section = _upright(grid, stations, section, closed, settings, flat)
-    first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
+    stations, path, section = _upright(grid, stations, section, closed, settings, flat)
+    first = _fit(grid, path, section, settings, None, flat)
     if first is None:
         return Refit(stations, closed=closed), False
     if not stations.curvature.any() and first.bent < _BENT:
@@ -113,21 +116,21 @@ def _refitted(
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
         return Refit(laid, first, intervals, closed), False
-    found = Refit(stations_of(joint, len(laid.arc_length), settings), joint, intervals, closed, flat)
+    found = Refit(laid, joint, intervals, closed, flat)
     return found if closed else _held(grid, found, open_ends, settings, flat), True
 
 
 def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Settings, flat: bool) -> Refit:
     """The open ridge cut at ends that its points do not hold, and fitted again without what lies beyond."""
     for _ in range(_CUTS):
-        joint, stations = found.joint, found.stations
+        joint, known = found.joint, found.stations.arc_length
         if joint is None:
             break
         start, end = held(joint, open_ends)
         length = end - start
-        if length >= stations.arc_length[-1] or length < SHORTEST * float(np.median(stations.width)):
+        if length >= known[-1] or length < SHORTEST * float(np.median(joint.terms[:, W])):
             break
-        count = max(round(length / stations.arc_length[1]) + 1, 13)
+        count = max(round(length / known[1]) + 1, 13)
         laid = stations_of(joint, count, settings, (start, end))
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:
@@ -138,7 +141,7 @@ def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Sett
             intervals[:, 0] = np.minimum(intervals[:, 0], (0.0, length))
             intervals[:, 1] = np.maximum(intervals[:, 1], (0.0, length))
             intervals.setflags(write=False)
-        found = Refit(stations_of(again, count, settings), again, intervals, False, flat)
+        found = Refit(laid, again, intervals, False, flat)
     return found
 
 
@@ -162,17 +165,19 @@ def _grown(
 
 def _upright(
     grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
-) -> tuple[Stations, Section]:
-    """Stations and section of a steep ridge as its fit begins: high flanks lean where the base is wrong."""
+) -> tuple[Stations, PathFrame, Section]:
+    """Stations, their path and section as a fit begins: high flanks lean where the base of a steep ridge is
+    wrong."""
     path = path_frame(stations, closed)
     if not is_steep(path) or settings.section not in FOUND:
-        return stations, section
+        return stations, path, section
     begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
     if begun is None or not _sound(begun):
-        return stations, section
+        return stations, path, section
     if not stations.curvature.any() and begun.bent < _BENT:
         begun = begun.without(C)
-    return stations_of(begun, len(stations.arc_length), settings), begun.section
+    laid = stations_of(begun, len(stations.arc_length), settings)
+    return laid, path_frame(laid, closed), begun.section
 
 
 def _fit(

@@ -9,21 +9,21 @@ from ridgefeature.free_section import FREE, LEARNED, SPANS, WIDER, free_section,
 from ridgefeature.kernels.strip import E, W
 from ridgefeature.noise import Noise
 from ridgefeature.section import Section, box
-from ridgefeature.smearing import smear
+from ridgefeature.smearing import Smeared, smear
 
 Array = NDArray[np.float64]
 
 
 def shaped(
-    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
+    points: Array, terms: Array, seen: Smeared, noise: Noise, inflation: float
 ) -> tuple[Section, Array]:
     """The section and terms (n, 6), or a free section and its terms where that is better beyond doubt.
 
-    A box is never kept. points (m, 3) in path coordinates and terms as in kernels.strip; inflation: variance
-    of sums over neighbouring points, by what it would be if their noise was independent.
+    A box is never kept. points (m, 3) in path coordinates and terms as in kernels.strip; seen: the section as
+    such noise smears it; inflation: variance of sums over neighbouring points, by what it would be if their
+    noise was independent.
     """
-    price = np.log(len(points))
-    seen = smear(section, terms, noise.blur, noise.even)
+    section, price = seen.section, np.log(len(points))
     wider = 1.0 if section.name == FREE else WIDER
     found = free_section(points, terms, seen, noise.told, SPANS, inflation * price, wider)
     if found is None or (section is not box() and found.gain / inflation < price * found.freedom):
@@ -34,7 +34,7 @@ def shaped(
 def between_feet(
     points: Array, terms: Array, section: Section, noise: Noise, inflation: float
 ) -> tuple[Section, Array]:
-    """A free section and its terms between its feet, where it is fitted again; arguments as for `shaped`."""
+    """A free section and its terms between its feet, where it is fitted again; else as for `shaped`."""
     section, middle, breadth = trimmed(section)
     terms = terms.copy()
     terms[:, E] += middle * terms[:, W]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,9 +99,14 @@ def log_likelihood(
 def _rule(blur: float) -> tuple[Array, Array]:
     """Places and shares of a quadrature over the standard normal distribution."""
     if blur <= _SMOOTH:
-        places, shares = np.polynomial.hermite.hermgauss(_FEW)
-        return np.asarray(np.sqrt(2.0) * places), np.asarray(shares / np.sqrt(np.pi))
+        return _gauss_hermite()
     return _even_rule(blur, _FINE)
+
+
+@cache
+def _gauss_hermite() -> tuple[Array, Array]:
+    places, shares = np.polynomial.hermite.hermgauss(_FEW)
+    return np.asarray(np.sqrt(2.0) * places), np.asarray(shares / np.sqrt(np.pi))
 
 
 def _even_rule(blur: float, apart: float) -> tuple[Array, Array]:

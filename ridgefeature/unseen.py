@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.strip import E, W, offsets
+from ridgefeature.kernels.strip import offsets, places_across
 from ridgefeature.smearing import Smeared
 
 Array = NDArray[np.float64]
@@ -30,9 +30,7 @@ def unseen_std(points: Array, terms: Array, seen: Smeared, scale: float) -> floa
     """
     section = seen.section
     on = offsets(points, terms, seen.told, scale)[1] < _NEAR * scale
-    nodes = np.arange(len(terms))
-    middle, width = (np.interp(points[on, 0], nodes, terms[:, k]) for k in (E, W))
-    eta = (points[on, 1] - middle) / width
+    eta = places_across(points[on], terms)
     low, high = section.half_height_places
     if np.abs(section.coefficients - section.coefficients[::-1]).max() < _ALIKE * section.coefficients.max():
         return 2.0 * _one_flank(np.abs(eta), high)

@@ -1,4 +1,4 @@
-"""What all points of a ridge say of its section: normal equations of a free spline."""
+"""Sums over the points of a ridge: what all of them say of its section, what neighbours have in common."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ridgefeature.kernels.residual import OPTIONS
 from ridgefeature.kernels.strip import Seen, seen_at, share_of_surface, terms_at
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 BASE = 3
 
 
@@ -82,3 +83,18 @@ def spline_sums(
         for p in range(k):
             matrix[p, k] = matrix[k, p]
     return matrix, right
+
+
+@njit(**OPTIONS)
+def strip_sums(windows: Indices, strips: Indices, values: Floats) -> tuple[Floats, Floats, Floats]:
+    """Sums (windows, strips) of values (m,), of their squares and of 1, by window and strip.
+
+    windows, strips (m,), m >= 1: those that each value is in, both from 0 on.
+    """
+    out = np.zeros((3, windows.max() + 1, strips.max() + 1))
+    for i in range(values.size):
+        m, k, v = windows[i], strips[i], values[i]
+        out[0, m, k] += v
+        out[1, m, k] += v * v
+        out[2, m, k] += 1.0
+    return out[0], out[1], out[2]

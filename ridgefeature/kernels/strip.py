@@ -168,6 +168,16 @@ def terms_at(terms: Floats, s: float) -> tuple[int, Terms]:
     )
 
 
+@njit(**OPTIONS)
+def places_across(points: Floats, terms: Floats) -> Floats:
+    """Places (m,) of points (m, 3) in path coordinates across the ridge, in widths from its middle."""
+    out = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
+        _, there = terms_at(terms, points[i, 0])
+        out[i] = (points[i, 1] - there[3]) / there[5]
+    return out
+
+
 @njit(**INNER)
 def seen_at(
     y: float, z: float, terms: Terms, values: Floats, reach: float, scale: float
