@@ -10,6 +10,7 @@ import numpy as np
 
 from ridgefeature.curvature import starts_on_base
 from ridgefeature.improve import FEWEST_POINTS, improve, sized, start_loss
+from ridgefeature.kernels.base import seen_from
 from ridgefeature.neighbours import LEAST_ADVANCE, advances
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -71,7 +72,7 @@ def append(chain: list[Template], settings: Settings, longest: bool = False) -> 
         status="start",
     )
     found = starts_on_base(last, positions, frames, length)
-    return [start.changed(position=place, rotation=axes) for place, axes in zip(*found, strict=True)]
+    return [start.changed(position=p, rotation=axes, base=base) for p, axes, base in zip(*found, strict=True)]
 
 
 def reject(fitted: Template, start: Template, settings: Settings, gap: bool = False) -> str:
@@ -220,7 +221,8 @@ def corners(
         ahead = np.cos(angle) * along + np.sin(angle) * left
         corner = end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
         axes = np.column_stack([ahead, np.cross(up, ahead), up])
-        found.append(straight.changed(position=corner + 0.5 * straight.length * ahead, rotation=axes))
+        place, base = corner + 0.5 * straight.length * ahead, seen_from(last.base, last.rotation.T @ axes)
+        found.append(straight.changed(position=place, rotation=axes, base=base))
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from statistics import NormalDist
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.improve import floor, improve, loss_of
 from ridgefeature.kernels import chain
-from ridgefeature.kernels.base import flattened, standing
+from ridgefeature.kernels.base import flattened, seen_from, standing, turning
 from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -50,6 +51,12 @@ class Found:
         whole = self.information.sum(axis=0)
         pull = np.einsum("nij,nj->i", self.information, self.terms)
         return solved(whole, pull)
+
+    def seen_from(self, axes: Array) -> Found:
+        """The same in a frame whose axes (3, 3), columns, are given in its own."""
+        yaw = float(np.arctan2(axes[1, 0], axes[0, 0]))
+        there, back = turning(yaw), turning(-yaw)
+        return replace(self, terms=self.terms @ there.T, information=back.T @ self.information @ back)
 
     def significant(self, chance: float) -> bool:
         """Whether the terms differ from zero by more than chance: their mean, or all together.
@@ -116,15 +123,17 @@ class Ahead:
 
     settings: Settings
     found: Found = field(default_factory=lambda: Found(np.zeros((1, 3)), np.zeros((1, 3, 3)), np.zeros(1)))
+    axes: Array = field(default_factory=lambda: np.eye(3))
+    """In which that is told: those of the last template."""
 
     def add(self, window: Window, template: Template) -> Template:
         """Learn from a fitted template; it is returned with the terms that are now expected of the base."""
         if self.settings.flat:
             return template
         new = _roughly(terms_of(window(template), template, self.settings), template.width)
-        old = replace(
-            self.found, information=_KEPT * self.found.information, points=_KEPT * self.found.points
-        )
+        turned = self.found.seen_from(self.axes.T @ template.rotation)
+        old = replace(turned, information=_KEPT * turned.information, points=_KEPT * turned.points)
+        self.axes = template.rotation
         both = Found(
             *(np.concatenate(pair) for pair in zip(vars(old).values(), vars(new).values(), strict=True))
         )
@@ -158,24 +167,39 @@ def _chi_square(degrees: int, chance: float) -> float:
 
 
 def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...]:
-    """The templates with the terms of their base smoothed along the chain, as much as is most likely."""
+    """The templates with the terms of their base smoothed along the chain, as much as is most likely.
+
+    They are compared in one frame that goes along the chain without turning about the base's normal.
+    """
+    ways = [a.rotation.T @ b.rotation for a, b in pairwise(templates)]
+    yaws = np.concatenate([[0.0], np.cumsum([np.arctan2(way[1, 0], way[0, 0]) for way in ways])])
+    own = np.array([turning(yaw) for yaw in yaws])
+    common = np.array([turning(-yaw) for yaw in yaws])
     steps = np.linalg.norm(np.diff([t.position for t in templates], axis=0), axis=1)
     at = np.concatenate([[0.0], np.cumsum(steps)])
     width = float(np.median([t.width for t in templates]))
-    tried = [smoothed(at, found.terms, found.information, drift / width**3) for drift in _DRIFTS]
+    terms = np.einsum("nij,nj->ni", common, found.terms)
+    information = np.ascontiguousarray(np.swapaxes(own, 1, 2) @ found.information @ own)
+    tried = [smoothed(at, terms, information, drift / width**3) for drift in _DRIFTS]
     smooth, variance, _ = max(tried, key=lambda fit: fit[2])
-    std = np.sqrt(np.maximum(variance, 0.0))
+    smooth = np.einsum("nij,nj->ni", own, smooth)
+    std = np.sqrt(np.maximum(np.einsum("nij,nj->ni", own**2, variance), 0.0))
     return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))
 
 
-def starts_on_base(last: Template, positions: Array, frames: Array, length: float) -> tuple[Array, Array]:
-    """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved."""
+def starts_on_base(
+    last: Template, positions: Array, frames: Array, length: float
+) -> tuple[Array, Array, Array]:
+    """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved; and its
+    terms in their frames (m, 3)."""
     if not last.base.any():
-        return chain.starts(positions, frames, last.length, length)
+        found = chain.starts(positions, frames, last.length, length)
+        return *found, np.zeros((len(found[0]), 3))
     own = last.rotation
     places = flattened((positions - last.position) @ own, last.base)
     turned = [own.T @ f for f in frames]
     axes = np.array([standing(p, np.eye(3), last.base)[1].T @ f for p, f in zip(places, turned, strict=True)])
     found = chain.starts(places, axes, last.length, length)
     laid = [standing(p, f, last.base) for p, f in zip(*found, strict=True)]
-    return np.array([last.position + own @ p for p, _ in laid]), np.array([own @ f for _, f in laid])
+    base = np.array([seen_from(last.base, f) for f in found[1]])
+    return np.array([last.position + own @ p for p, _ in laid]), np.array([own @ f for _, f in laid]), base

@@ -94,8 +94,12 @@ def guess(
                 best = _better(best, fitted, True, apart, *known[1:])
     if best is None:
         return None
-    # The length still is that of the start's width, so window and fit get one more round together.
-    return _fitted(window, sized(best[2], settings), pick, settings)
+    # The length still is that of the start's width, so window and fit get one more round together: unless the
+    # ground about the longer one, taken for flat, is what it then fits.
+    last = _fitted(window, sized(best[2], settings), pick, settings)
+    least = _DISTINCT * settings.distinct
+    lost = best[0] and distinct(window, last, settings) < least <= distinct(window, best[2], settings)
+    return best[2] if lost else last
 
 
 def _is_clear(best: _Best | None) -> bool:

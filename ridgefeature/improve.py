@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels import appraise, residual
 from ridgefeature.kernels.algebra import moved
-from ridgefeature.kernels.base import on_base, standing
+from ridgefeature.kernels.base import on_base, seen_from, standing
 from ridgefeature.kernels.base_terms import found_terms
 from ridgefeature.kernels.evidence import assess
 from ridgefeature.kernels.fit import bounds, fit
@@ -165,11 +165,13 @@ def _moved(template: Template, transform: Array, q: Array) -> Template:
 
 def _standing(template: Template, position: Array, rotation: Array, height: float, width: float) -> Template:
     """The template after a fit, which saw its base as flat: on a curved one the frame goes along with it."""
-    if template.base.any():
+    base = template.base
+    if base.any():
         old = template.rotation
-        place, axes = standing(old.T @ (position - template.position), old.T @ rotation, template.base)
-        position, rotation = template.position + old @ place, old @ axes
-    return template.changed(position=position, rotation=rotation, height=height, width=width)
+        turn = old.T @ rotation
+        place, axes = standing(old.T @ (position - template.position), turn, base)
+        position, rotation, base = template.position + old @ place, old @ axes, seen_from(base, turn)
+    return template.changed(position=position, rotation=rotation, height=height, width=width, base=base)
 
 
 def sample(template: Template, along: int = 9, across: int = 21) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import rotation_of
-from ridgefeature.kernels.base import standing
+from ridgefeature.kernels.base import seen_from, standing
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
@@ -100,7 +100,9 @@ class Template:
         bend, rise, widening = self.trend
         turn, _ = rotation_of(np.array([0.0, 0.0, bend * x]))
         shift = np.array([x, 0.5 * bend * x**2, 0.0])
-        if self.base.any():
+        base = self.base
+        if base.any():
+            base = seen_from(base, turn)
             shift, turn = standing(shift, turn, self.base)
         rate_h = 1.0 if not self.height else 1.0 + min(max(rise * x / self.height, -0.5), 0.5)
         rate_w = 1.0 + min(max(widening * x / self.width, -0.5), 0.5)
@@ -109,4 +111,5 @@ class Template:
             rotation=self.rotation @ turn,
             height=float(self.height * rate_h),
             width=float(self.width * rate_w),
+            base=base,
         )

@@ -72,6 +72,30 @@ def on_base(points: Floats, terms: Floats) -> Floats:
 
 
 @njit(cache=True)
+def turning(yaw: float) -> Floats:
+    """(3, 3) what the terms of a base become in a frame turned about its normal by this angle."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [[c * c, 2.0 * c * s, s * s], [-c * s, c * c - s * s, c * s], [s * s, -2.0 * c * s, c * c]]
+    )
+
+
+@njit(cache=True)
+def seen_from(terms: Floats, axes: Floats) -> Floats:
+    """The terms (3,) in a frame whose axes (3, 3), columns, are given in the base's own.
+
+    The ground does not turn with the ridge: where a path bends its base is another.
+    """
+    if terms[0] == 0.0 and terms[1] == 0.0 and terms[2] == 0.0:
+        return terms
+    turn, out = turning(math.atan2(axes[1, 0], axes[0, 0])), np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            out[i] += turn[i, j] * terms[j]
+    return out
+
+
+@njit(cache=True)
 def standing(place: Floats, turn: Floats, terms: Floats) -> tuple[Floats, Floats]:
     """Position (3,) and axes (3, 3) in the template's frame of what is placed, turned as if it was flat."""
     position = on_base(place.copy().reshape(1, 3), terms)[0]
