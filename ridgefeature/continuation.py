@@ -35,7 +35,7 @@ _WORSE_ACROSS = (3.0, 1.5)
 """Most noise of a template beyond a crossing, straight on and in a bend, in the least of the last five."""
 _BEYOND_EVIDENCE = 0.3
 """Least evidence of a template behind a bend or crossing, in parts of that of the one before."""
-_USUAL = 5
+USUAL = 5
 _OUTGROWN = 2.5
 """Width of a template, in parts of the median of the last five, that is another ridge's."""
 _RISEN, _FEW = 1.5, 3
@@ -101,7 +101,7 @@ def reject(fitted: Template, start: Template, settings: Settings, gap: bool = Fa
 
 def outgrown(fitted: Template, chain: list[Template]) -> str:
     """Why a template is no part of a ridge as the last ones show it: another, wider rise under it."""
-    usual = statistics.median(t.width for t in chain[-_USUAL:])
+    usual = statistics.median(t.width for t in chain[-USUAL:])
     return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
 
 
@@ -110,7 +110,7 @@ def sparse(full: Window, fitted: Template, chain: list[Template], gap: bool = Fa
 
     gap: it lies beyond a gap. Strays give themselves away by their noise there.
     """
-    known = [t for t in chain if t.evidence > 0.0][-_USUAL:]
+    known = [t for t in chain if t.evidence > 0.0][-USUAL:]
     if not known:
         return ""
     noisy = gap and fitted.scale > _NOISY * statistics.median(t.scale for t in known)
@@ -128,7 +128,7 @@ def _density(full: Window, template: Template) -> float:
 
 def risen(fitted: Template, chain: list[Template]) -> bool:
     """Whether a template is so much higher than the last ones that it may be the edge of the surface."""
-    usual = statistics.median(abs(t.height) for t in chain[-_USUAL:])
+    usual = statistics.median(abs(t.height) for t in chain[-USUAL:])
     return len(chain) >= _FEW and abs(fitted.height) > _RISEN * usual
 
 
@@ -151,7 +151,7 @@ def met(template: Template, others: list[Template]) -> int:
 
 def misfits(fitted: Template, chain: list[Template]) -> bool:
     """Whether a template fits much worse than the last ones: where ridges meet, or it is none any more."""
-    usual = min(t.scale for t in chain[-_USUAL:])
+    usual = min(t.scale for t in chain[-USUAL:])
     return fitted.scale > max(_MISFIT * usual, _LEAST_MISFIT * abs(fitted.height))
 
 
@@ -180,7 +180,7 @@ def _best_beyond(
 
     worse: most noise, in the least of the last five.
     """
-    last, least = chain[-1], min(t.scale for t in chain[-_USUAL:])
+    last, least = chain[-1], min(t.scale for t in chain[-USUAL:])
     found = [(start, improve(rough, start, settings), "") for start in starts]
     for start, fitted, why in sorted(found, key=lambda best: best[1].scale):
         # By point: the last one may have been fitted to all points of its window, this one to some.

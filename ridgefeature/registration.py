@@ -14,7 +14,8 @@ from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, neare
 from ridgefeature.guess import guess
 from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, resettled
-from ridgefeature.march import GOES_ON, Progress, Track, march, reverse
+from ridgefeature.march import Progress, Track, march, reverse
+from ridgefeature.onward import followed, open_ends
 from ridgefeature.ridge import Ridge
 from ridgefeature.rings import CLOSED, ring_or_not
 from ridgefeature.scan import Scan, as_scan
@@ -81,17 +82,20 @@ def register(
     except NoRidgeError:
         # What lies nearest to the pick is none: what explains most about it may be one.
         track = _track(rough, full, pick, extent, hints, settings, progress, aimed=False)
-    return _constructed(grid, _directed(track, pick, hints), settings, scan, pick)
+    return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
 
 
-def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick: Array) -> Ridge:
+def _constructed(
+    rough: Window, full: Window, track: Track, settings: Settings, scan: Scan, pick: Array
+) -> Ridge:
     """The ridge of a settled march: fitted as a whole, where templates are fitted by residuals."""
-    templates = _with_distances(track.templates, grid)
-    stations, section, intervals = lay_out(templates, settings, track.closed), templates[0].section, None
+    section, intervals, grid = track.templates[0].section, None, full.grid
+    stations = lay_out(track.templates, settings, track.closed)
     closed, stop = track.closed, track.stop
     if settings.measure == "residual":
-        ends = not stop[0].startswith(GOES_ON), not stop[1].startswith(GOES_ON)
-        found = fitted_over_ground(grid, stations, section, closed, ends, settings)
+        found = fitted_over_ground(grid, stations, section, closed, open_ends(stop), settings)
+        found, track = followed(rough, full, found, track, settings)
+        stop = track.stop
         stations, intervals = found.stations, found.end_interval
         section = section if found.joint is None else found.joint.section
         if found.closed:
@@ -102,7 +106,7 @@ def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick:
     return Ridge(
         **vars(stations),
         section=section,
-        templates=templates,
+        templates=_with_distances(track.templates, grid),
         stop=stop,
         closed=closed,
         end_interval=intervals,
