@@ -116,10 +116,13 @@ def fit_whole(
     state: State | None = _begun(task, section, before)
     if state is not None and task.steep and before is None and shaping:
         state = likeliest(task, state)
+    if shared and task.steep:
+        for n in range(3):
+            state = improved(task, some, state, 0, exact=True)
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = improved(task, points if last else some, state, left, shared=shared and last)
+        state = improved(task, points if last else some, state, left, shared=shared and last, exact=shared and task.steep)
         if last or state is None:
             break
         if shaping:

@@ -13,7 +13,7 @@ from ridgefeature.kernels.strip import C, W, information, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame, wanted_differences
 from ridgefeature.section import Section
-from ridgefeature.smearing import log_likelihood, smear
+from ridgefeature.smearing import likelihood_scores, log_likelihood, smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
 from ridgefeature.template import STEEP
 
@@ -93,7 +93,7 @@ def _sizes(path: PathFrame) -> tuple[float, float]:
 
 
 def improved(
-    task: Task, points: Array, state: State | None, left: int, near: bool = False, shared: bool = False
+    task: Task, points: Array, state: State | None, left: int, near: bool = False, shared: bool = False, exact: bool=False
 ) -> State | None:
     """All terms fitted again to points; None where nothing finite came of it.
 
@@ -109,6 +109,8 @@ def improved(
         _by_foot_points(points, state, *scales) if near else _linearised(points, task.some, state, *scales)
     )
     matrix, goal, noise, gain = found
+    if exact:
+        matrix, goal, gain = *_by_likelihood(points, replace(state, noise=noise)), 1.0
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
@@ -156,6 +158,13 @@ def _linearised(
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
     return matrix, right, noise, gain
+
+
+def _by_likelihood(points: Array, state: State) -> tuple[Array, Array]:
+    """Normal equations of all stretches for changes of the terms, by the likelihood itself."""
+    noise = state.noise
+    told = noise.blur, noise.even, noise.strays, noise.span
+    return likelihood_scores(points, state.terms, state.section, *told)
 
 
 def _in_common(points: Array, state: State, noise: Noise) -> Array:
