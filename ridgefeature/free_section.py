@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,14 +15,15 @@ from ridgefeature.kernels.section_sums import cell_sums, spline_sums
 from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.one_hump import one_hump, symmetric_hump
 from ridgefeature.section import Section, box
-from ridgefeature.smearing import Smeared
-from ridgefeature.unseen import unseen_std
+from ridgefeature.smearing import Smeared, likelihood_section_scores
 
 Array = NDArray[np.float64]
 
 SPANS = 40
 """Of the free spline, over WIDER widths."""
 WIDER = 1.25
+Told = Callable[[int, float], tuple[Array, Array]]
+"""Normal equations of a section of so many spans over so many widths, and of changes of the base."""
 FREE = "free"
 LEARNED = "learned"
 _LOW = (0.04, 0.1, 0.25)
@@ -71,21 +73,15 @@ class FreeSection:
 
 
 def free_section(
-    points: Array,
-    terms: Array,
-    seen: Smeared,
-    noise: tuple[float, float],
-    spans: int,
-    price: float,
-    wider: float = WIDER,
+    told: Told, section: Section, count: int, spans: int, price: float, wider: float = WIDER
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
-    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section before, smeared;
-    noise: scale and strays' density; price: of a coefficient, in twice the log likelihood ratio. It spans
-    `wider` widths: where its feet are `trimmed` tells once it is final.
+    told: what so many points say of it (`by_means`, `by_likelihood`); section: the one before; price: of a
+    coefficient, in twice the log likelihood ratio. It spans `wider` widths: where its feet are `trimmed`
+    tells once it is final.
     """
-    matrix, right = _sums(points, terms, seen, noise, spans, wider)
+    matrix, right = told(spans, wider)
     told = np.diagonal(matrix)
     if not (np.isfinite(matrix).all() and (told[-3:] > 0).all() and (told[:-3] > 0).any()):
         return None
@@ -93,19 +89,36 @@ def free_section(
     if not found[3:-6].max() > 0:
         return None
     cost = 0.5 * price * freedom
-    found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * len(points), cost))
+    found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * count, cost))
     if not np.convolve(found[3:-6], _AT_KNOT).max() > 0:
         return None
-    gain = _gain(matrix, right, found, seen.section, spans, wider)
+    gain = _gain(matrix, right, found, section, spans, wider)
     return FreeSection(found, wider, gain, part * freedom, shift * wider / spans)
 
 
-def _sums(
-    points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], spans: int, wider: float
-) -> tuple[Array, Array]:
-    """Normal equations of a section of so many spans, and of changes of the base."""
+def by_means(points: Array, terms: Array, seen: Smeared, noise: tuple[float, float]) -> Told:
+    """What points say of a section by their mean heights.
+
+    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section as it is,
+    smeared; noise: scale and strays' density.
+    """
     sums, base_matrix, base_right = cell_sums(points, terms, seen.told, *noise)
-    return spline_sums(sums, seen.basis(spans, wider), base_matrix, base_right)
+    return lambda spans, wider: spline_sums(sums, seen.basis(spans, wider), base_matrix, base_right)
+
+
+def by_likelihood(
+    points: Array, terms: Array, section: Section, noise: tuple[float, float, float, float]
+) -> Told:
+    """The same by their likelihood itself; noise: as `smearing.log_likelihood` has it."""
+
+    def told(spans: int, wider: float) -> tuple[Array, Array]:
+        matrix, right = likelihood_section_scores(points, terms, section, *noise, spans, wider)
+        sites, nearest = _nearest_spline(spans)
+        old = nearest @ section((sites - 0.5) * wider)
+        right += matrix[:, : spans + 3] @ old
+        return matrix, right
+
+    return told
 
 
 def trimmed(section: Section) -> tuple[Section, float, float]:
@@ -130,16 +143,14 @@ class SectionStd:
     """Of its place."""
 
 
-def section_std(
-    points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], inflation: float
-) -> SectionStd:
-    """How sure a learned section is; arguments as for `free_section`. One that has a name is as sure as its
-    flanks were seen."""
-    section, gap = seen.section, unseen_std(points, terms, seen, noise[0])
+def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> SectionStd:
+    """How sure a learned section is; arguments as for `free_section`, and `unseen_std` of its flanks. One
+    that has a name is as sure as these."""
+    section = seen.section
     if section.name not in (LEARNED, FREE, box().name):
         return SectionStd(half_height_width=gap, width=gap)
     spans = section.spans
-    matrix, right = _sums(points, terms, seen, noise, spans, 1.0)
+    matrix, right = told(spans, 1.0)
     inverse = _smoothest(matrix, right, spans)[2]
     covariance = inflation * inverse[:-3, :-3]
     eta = np.linspace(-0.5, 0.5, 2001)

@@ -56,6 +56,11 @@ class Noise:
         """As the kernels take it."""
         return self.scale, self.density
 
+    @property
+    def all(self) -> tuple[float, float, float, float]:
+        """As a likelihood takes it."""
+        return self.blur, self.even, self.strays, self.span
+
 
 def first_noise(
     points: Array, terms: Array, section: Section, h: float, w: float, even: float | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.scores import scores
+from ridgefeature.kernels.scores import scores, section_scores
 from ridgefeature.kernels.smeared import log_likelihood as kernel
 from ridgefeature.kernels.smeared import smeared, smeared_basis
 from ridgefeature.kernels.strip import H, W
@@ -97,6 +97,25 @@ def likelihood_scores(
     """Information (nodes - 1, 6, 6) and derivatives (nodes - 1, 6) of the same, of each stretch."""
     rule = _fine_rule(terms[:, H], terms[:, W], section, noise)
     return scores(points, terms, section.table, even, *rule, noise, strays, span)
+
+
+def likelihood_section_scores(
+    points: Array,
+    terms: Array,
+    section: Section,
+    noise: float,
+    even: float,
+    strays: float,
+    span: float,
+    spans: int,
+    wider: float,
+) -> tuple[Array, Array]:
+    """Information (spans + 6, spans + 6) and derivatives (spans + 6,) of the same with the coefficients of a
+    spline section of so many spans over `wider` widths, and with changes of the base."""
+    rule = _fine_rule(terms[:, H], terms[:, W], section, noise)
+    return section_scores(
+        points, terms, section.table, even, *rule, noise, strays, span, spans, wider
+    )
 
 
 def _fine_rule(h: Array, w: Array, section: Section, noise: float) -> tuple[Array, Array]:

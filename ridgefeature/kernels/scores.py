@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.residual import OPTIONS, split
+from ridgefeature.kernels.section_sums import BASE
 from ridgefeature.kernels.smeared import crowded, section_at
 from ridgefeature.kernels.strip import TERMS, A, B, C, E, H, W, terms_at
 
@@ -83,4 +84,86 @@ def scores(
         for p in range(TERMS):
             for q in range(p):
                 matrix[j, q, p] = matrix[j, p, q]
+    return matrix, right
+
+
+@njit(**OPTIONS)
+def section_scores(
+    points: Floats,
+    terms: Floats,
+    table: Floats,
+    even: float,
+    abscissae: Floats,
+    shares: Floats,
+    noise: float,
+    strays: float,
+    span: float,
+    spans: int,
+    wider: float,
+) -> tuple[Floats, Floats]:
+    """The same (spans + 6, spans + 6), (spans + 6,) with the coefficients of a spline section and the base.
+
+    They are those of cubic B-splines on so many even knots over `wider` widths, in apex heights, and changes
+    of the base in powers of y.
+    """
+    own = split(table)
+    size = spans + 3
+    matrix, right = np.zeros((size + BASE, size + BASE)), np.zeros(size + BASE)
+    least = strays / span
+    density = (1.0 - strays) / (math.sqrt(2.0 * math.pi) * noise)
+    top, below, row = np.empty(size), np.empty(size), np.empty(size + BASE)
+    for i in range(points.shape[0]):
+        y = points[i, 1]
+        _, (a, b, c, e, h, w) = terms_at(terms, points[i, 0])
+        z = points[i, 2] - a - y * (b + c * y)
+        top[:] = 0.0
+        below[:] = 0.0
+        low, high = size, 0
+        d = n = n_z = 0.0
+        for k in range(abscissae.size):
+            eta = (y - e + noise * abscissae[k]) / w
+            f, slope, _ = section_at(eta, own)
+            dense, steeper, _ = crowded(slope, h / w, even)
+            r = (z - h * f) / noise
+            near = math.exp(-0.5 * min(r * r, 1e3))
+            pull = shares[k] * near * dense * r / noise
+            d += shares[k] * dense
+            n += shares[k] * near * dense
+            n_z += pull
+            place = (eta / wider + 0.5) * spans
+            if not 0.0 <= place < spans:
+                continue
+            first = np.int64(place)
+            low, high = min(low, first), max(high, first + 4)
+            t = place - first
+            s = 1.0 - t
+            crowd = shares[k] * steeper * spans / wider
+            raised, pull = near * crowd, pull * h
+            for p, value, rate in (
+                (0, s * s * s / 6.0, -0.5 * s * s),
+                (1, (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0, t * (1.5 * t - 2.0)),
+                (2, (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0, -s * (1.5 * s - 2.0)),
+                (3, t * t * t / 6.0, 0.5 * t * t),
+            ):
+                top[first + p] += pull * value + raised * rate
+                below[first + p] += crowd * rate
+        if n <= 0.0:
+            continue
+        on = density * n / d
+        share = on / (least + on)
+        for p in range(low, high):
+            row[p] = share * (top[p] / n - below[p] / d)
+            right[p] += row[p]
+            for q in range(low, p + 1):
+                matrix[p, q] += row[p] * row[q]
+        for k in range(BASE):
+            row[size + k] = share * n_z / n * y**k
+            right[size + k] += row[size + k]
+            for p in range(low, high):
+                matrix[size + k, p] += row[size + k] * row[p]
+            for p in range(k + 1):
+                matrix[size + k, size + p] += row[size + k] * row[size + p]
+    for p in range(size + BASE):
+        for q in range(p):
+            matrix[q, p] = matrix[p, q]
     return matrix, right
