@@ -41,6 +41,8 @@ _ROUNDS = 8
 _LEAST_SPANS = 20
 _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 """Of three coefficients, in the height at the middle one's knot."""
+_HIGH = 0.9
+"""Height above which a section's knots are on its top."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -73,19 +75,27 @@ class FreeSection:
 
 
 def free_section(
-    told: Told, section: Section, count: int, spans: int, price: float, wider: float = WIDER
+    told: Told,
+    section: Section,
+    count: int,
+    spans: int,
+    price: float,
+    wider: float = WIDER,
+    split: bool = False,
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
     told: what so many points say of it (`by_means`, `by_likelihood`); section: the one before; price: of a
     coefficient, in twice the log likelihood ratio. It spans `wider` widths: where its feet are `trimmed`
-    tells once it is final.
+    tells once it is final. split: its top is as smooth as the points ask for there: as rough as steep flanks
+    it would rise to a spike where one hump is asked for.
     """
     matrix, right = told(spans, wider)
-    told = np.diagonal(matrix)
-    if not (np.isfinite(matrix).all() and (told[-3:] > 0).all() and (told[:-3] > 0).any()):
+    known = np.diagonal(matrix)
+    if not (np.isfinite(matrix).all() and (known[-3:] > 0).all() and (known[:-3] > 0).any()):
         return None
-    found, freedom, inverse = _smoothest(matrix, right, spans)
+    top = _top(section, spans, wider) if split else None
+    found, freedom, inverse = _smoothest(matrix, right, spans, top)
     if not found[3:-6].max() > 0:
         return None
     cost = 0.5 * price * freedom
@@ -176,28 +186,46 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> Sect
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
 
-def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, Array]:
+def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
+    """Which knots (spans + 1,) of a spline over `wider` widths lie on the top of a section."""
+    f = section((np.arange(spans + 1) / spans - 0.5) * wider)
+    high = np.flatnonzero(f > _HIGH)
+    top = np.zeros(spans + 1, dtype=np.bool_)
+    top[high[0] + 1 : high[-1]] = True
+    return top
+
+
+def _smoothest(
+    matrix: Array, right: Array, spans: int, top: NDArray[np.bool_] | None = None
+) -> tuple[Array, float, Array]:
     """Coefficients of largest restricted likelihood (as in ridgefeature.smoothing), effective number and
-    covariance."""
+    covariance.
+
+    top (spans + 1,): which knots are on the top: as smooth by itself, not as rough as steep flanks ask for.
+    """
     n = spans + 3
     d = np.zeros((n - 2, len(matrix)))
     d[:, :n] = np.diff(np.eye(n), 2, axis=0)
-    penalty = d.T @ d
+    parts = [d] if top is None or top.all() or not top.any() else [d[~top], d[top]]
+    penalties = np.array([part.T @ part for part in parts])
     # Feet: the section ends flat.
     pinned = np.zeros(len(matrix))
     pinned[[0, 1, 2, n - 3, n - 2, n - 1]] = 1e3 * np.diagonal(matrix)[:n].max()
     size = float(np.diagonal(matrix)[:n].mean())
-    lam = 1e-3 * size
+    lam = np.full(len(parts), 1e-3 * size)
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        inverse = np.asarray(np.linalg.inv(matrix + lam * penalty + ridge), dtype=np.float64)
+        inverse = np.asarray(
+            np.linalg.inv(matrix + np.tensordot(lam, penalties, 1) + ridge), dtype=np.float64
+        )
         found = inverse @ right
-        rough = float(((d @ found) ** 2).sum())
-        free = max(n - 2 - lam * float((penalty * inverse).sum()), 1e-2)
+        rough = np.array([((part @ found) ** 2).sum() for part in parts])
+        tied = lam * (penalties * inverse).sum(axis=(1, 2))
+        free = np.maximum([len(part) for part in parts] - tied, 1e-2)
         # Always as many rounds: stopping early would let rounding decide on the result.
-        low, high = max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)
-        lam = float(np.clip(free / max(rough, 1e-300), low, high))
-    return found, free, inverse
+        low, high = np.maximum(1e-2 * lam, 1e-9 * size), np.minimum(1e2 * lam, 1e6 * size)
+        lam = np.clip(free / np.maximum(rough, 1e-300), low, high)
+    return found, float(free.sum()), inverse
 
 
 def _humped(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.free_section import FREE, LEARNED, SectionStd, section_std
+from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
 from ridgefeature.kernels.strip import TERMS, C, E, H, W, offsets
@@ -18,6 +18,7 @@ from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, told_of
 from ridgefeature.smearing import Smeared, smear
 from ridgefeature.smoothing import Smooth, basis_at
+from ridgefeature.steep_end import likelier
 from ridgefeature.steep_start import likeliest
 from ridgefeature.unseen import unseen_std
 
@@ -105,7 +106,8 @@ def fit_whole(
     section may be far off. rounds: at most, of which the last does not change the section any
     more; 0: only how a steep one begins. flat: the
     base stays as curved across as the path has it. most: about as many points are looked at. shared: in the
-    last round errors that points have in common are looked for.
+    last round errors that points have in common are looked for; a steep ridge is fitted by its likelihood
+    itself then.
     """
     beside = settings.flank * (_BESIDE if is_steep(path) else 1.0)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
@@ -117,15 +119,13 @@ def fit_whole(
     state: State | None = _begun(task, section, before)
     if state is not None and task.steep and before is None and shaping:
         state = likeliest(task, state)
-    exact = shared and task.steep
-    if exact and state is not None:
-        points, some = (_clear_of_ends(p, path, state.noise.blur) for p in (points, some))
-        task = replace(task, some=some)
-        state = _exactly(task, state)
+    if shared and task.steep and state is not None:
+        state = likelier(task, points, state, shaping)
+        return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit)
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = improved(task, points if last else some, state, left, shared=shared and last, exact=exact)
+        state = improved(task, points if last else some, state, left, shared=shared and last)
         if last or state is None:
             break
         if shaping:
@@ -133,7 +133,7 @@ def fit_whole(
             shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
-    return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit, exact)
+    return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit)
 
 
 def _begun(task: Task, section: Section, before: Joint | None) -> State:
@@ -157,46 +157,13 @@ def _reshaped(task: Task, state: State) -> State:
     return new if chance(task.some, new) > chance(task.some, state) else state
 
 
-def _clear_of_ends(points: Array, path: PathFrame, blur: float) -> Array:
-    """The points that the noise is unlikely to have carried over an end of an open ridge: beyond a wall across
-    it the ground is low, and that would look like narrow flanks."""
-    if path.overlap:
-        return points
-    nodes = np.arange(len(path.at))
-    low, high = np.interp((path.at[0] + _CLEAR * blur, path.at[-1] - _CLEAR * blur), path.at, nodes)
-    return points[(points[:, 0] > low) & (points[:, 0] < high)]
-
-
-_CLEAR=2.0
-
-
-def _exactly(task: Task, state: State | None) -> State | None:
-    """By the likelihood itself, section too."""
-    for n in range(_EXACT_ROUNDS):
-        for _ in range(2):
-            state = improved(task, task.some, state, 0, exact=True)
-        if state is None:
-            return None
-        told = state.noise, state.inflation, True
-        new = state.given(*shaped(task.some, state.terms, state.section, *told))
-        if new.section is state.section and new.section.name != LEARNED: break
-        new = new.given(*between_feet(task.some, new.terms, new.section, *told))
-        after = improved(task, task.some, new, 0, exact=True)
-        if DEBUG: print(n, state.section.name, chance(task.some, state), chance(task.some,new), after and chance(task.some,after), after and after.section.half_height_width)
-        if after is None or chance(task.some, after) < chance(task.some, state): break
-        state = after
-    return state
-DEBUG=False
-_EXACT_ROUNDS=3
-
-
-def _joint(points: Array, some: Array, path: PathFrame, state: State, fit: Fit, exact: bool) -> Joint:
+def _joint(points: Array, some: Array, path: PathFrame, state: State, fit: Fit) -> Joint:
     stretches = len(path.at) - 1
     counts = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches].astype(float)
     terms, noise, inflation = state.terms, state.noise, state.inflation
     seen = smear(state.section, terms, noise.blur, noise.even)
-    told = told_of(some, terms, state.section, noise, exact)
-    shape = section_std(told, seen, unseen_std(some, terms, seen, noise.scale), inflation)
+    known = told_of(some, terms, state.section, noise, fit.exact)
+    shape = section_std(known, seen, unseen_std(some, terms, seen, noise.scale), inflation)
     misfit = _misfit(some, terms, seen, noise.scale)
     told = fit.smooth, terms, state.section, fit.matrix, fit.goal
     return Joint(path, *told, counts, misfit, noise, inflation, shape)

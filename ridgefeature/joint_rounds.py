@@ -33,6 +33,8 @@ class Fit:
     smooth: Smooth
     matrix: Array
     goal: Array
+    exact: bool = False
+    """Whether by the likelihood itself, not by mean heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +95,20 @@ def _sizes(path: PathFrame) -> tuple[float, float]:
 
 
 def improved(
-    task: Task, points: Array, state: State | None, left: int, near: bool = False, shared: bool = False, exact: bool=False
+    task: Task,
+    points: Array,
+    state: State | None,
+    left: int,
+    near: bool = False,
+    shared: bool = False,
+    exact: bool = False,
 ) -> State | None:
     """All terms fitted again to points; None where nothing finite came of it.
 
     left: rounds still to come: until then what the terms miss is no stray yet. near: by the distances of the
     points from the nearest places of the section (ridgefeature.foot_points), all of them of `task`. shared:
-    errors that points beside each other along the ridge have in common are looked for.
+    errors that points beside each other along the ridge have in common are looked for. exact: by the
+    likelihood itself, from terms near its largest, not by mean heights.
     """
     if state is None:
         return None
@@ -129,7 +138,7 @@ def improved(
     if not np.isfinite(terms).all():
         return None
     terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-    fit = Fit(smooth, matrix, goal)
+    fit = Fit(smooth, matrix, goal, exact)
     return State(terms, state.section, noise, smooth.weights, inflation, smooth.freedom, fit)
 
 

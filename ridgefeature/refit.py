@@ -76,10 +76,10 @@ def _as_known(grid: Grid, found: Refit, settings: Settings) -> Refit:
     Only now: an end that runs into something else is told by terms that follow its points. Where most of the
     points have much in common it is the ridge that is not of the model's shape: then its terms stay.
     """
-    joint, kept = found.joint, replace(settings, section="bell")  # the section as it is
+    joint = found.joint
     if joint is None:
         return found
-    again = fit_whole(grid, joint.path, joint.section, kept, joint, 1, found.flat, MOST_POINTS, True)
+    again = fit_whole(grid, joint.path, joint.section, settings, joint, 1, found.flat, MOST_POINTS, True)
     if again is None or not _sound(again):
         return found
     if again.inflation > CORRELATED:

@@ -42,7 +42,7 @@ def shaped(
     price = np.log(len(points))
     told = told_of(points, terms, section, noise, exact)
     wider = 1.0 if section.name == FREE else WIDER
-    found = free_section(told, section, len(points), SPANS, inflation * price, wider)
+    found = free_section(told, section, len(points), SPANS, inflation * price, wider, exact)
     if found is None or (section is not box() and found.gain / inflation < price * found.freedom):
         return section, terms
     return found.applied(terms)
@@ -57,7 +57,7 @@ def between_feet(
     terms[:, E] += middle * terms[:, W]
     terms[:, W] *= breadth
     told, price = told_of(points, terms, section, noise, exact), inflation * np.log(len(points))
-    found = free_section(told, section, len(points), section.spans, price, 1.0)
+    found = free_section(told, section, len(points), section.spans, price, 1.0, exact)
     return (section, terms) if found is None else found.applied(terms, LEARNED)
 
 

@@ -113,9 +113,7 @@ def likelihood_section_scores(
     """Information (spans + 6, spans + 6) and derivatives (spans + 6,) of the same with the coefficients of a
     spline section of so many spans over `wider` widths, and with changes of the base."""
     rule = _fine_rule(terms[:, H], terms[:, W], section, noise)
-    return section_scores(
-        points, terms, section.table, even, *rule, noise, strays, span, spans, wider
-    )
+    return section_scores(points, terms, section.table, even, *rule, noise, strays, span, spans, wider)
 
 
 def _fine_rule(h: Array, w: Array, section: Section, noise: float) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
-"""What points say of a steep ridge by their likelihood itself: its derivatives with the terms and the section.
+"""What points say of a steep ridge by their likelihood itself: its derivatives with terms and section.
 
-Beside a steep flank a point is high or low, and its mean height (kernels.strip) tells less than the mixture of
-heights that its noise may have carried it from (as in `smeared.log_likelihood`). The information is the sum of
-outer products of the derivatives (Berndt, Hall, Hall and Hausman 1974).
+Beside a steep flank a point is high or low, and its mean height (kernels.strip) tells less than the mixture
+of heights that its noise may have carried it from (as in `smeared.log_likelihood`). The information is the
+sum of outer products of the derivatives (Berndt, Hall, Hall and Hausman 1974).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def scores(
     own = split(table)
     stretches = terms.shape[0] - 1
     matrix, right = np.zeros((stretches, TERMS, TERMS)), np.zeros((stretches, TERMS))
-    least = strays / span
+    least, reach = strays / span, abscissae.max()
     density = (1.0 - strays) / (math.sqrt(2.0 * math.pi) * noise)
     row = np.empty(TERMS)
     for i in range(points.shape[0]):
@@ -49,7 +49,11 @@ def scores(
         j, (a, b, c, e, h, w) = terms_at(terms, points[i, 0])
         z = points[i, 2] - a - y * (b + c * y)
         d = d_e = d_h = d_w = n = n_z = n_e = n_h = n_w = 0.0
-        for k in range(abscissae.size):
+        flat = abs(y - e) > 0.5 * w + noise * reach
+        if flat:
+            d, n = 1.0, math.exp(-0.5 * min(z * z / (noise * noise), 1e3))
+            n_z = n * z / (noise * noise)
+        for k in range(0 if flat else abscissae.size):
             eta = (y - e + noise * abscissae[k]) / w
             f, slope, bow = section_at(eta, own)
             dense, steeper, taller = crowded(slope, h / w, even)
@@ -109,7 +113,7 @@ def section_scores(
     own = split(table)
     size = spans + 3
     matrix, right = np.zeros((size + BASE, size + BASE)), np.zeros(size + BASE)
-    least = strays / span
+    least, reach = strays / span, abscissae.max()
     density = (1.0 - strays) / (math.sqrt(2.0 * math.pi) * noise)
     top, below, row = np.empty(size), np.empty(size), np.empty(size + BASE)
     for i in range(points.shape[0]):
@@ -118,9 +122,13 @@ def section_scores(
         z = points[i, 2] - a - y * (b + c * y)
         top[:] = 0.0
         below[:] = 0.0
-        low, high = size, 0
+        low, high = np.int64(size), np.int64(0)
         d = n = n_z = 0.0
-        for k in range(abscissae.size):
+        flat = abs(y - e) > 0.5 * max(wider, 1.0) * w + noise * reach
+        if flat:
+            d, n = 1.0, math.exp(-0.5 * min(z * z / (noise * noise), 1e3))
+            n_z = n * z / (noise * noise)
+        for k in range(0 if flat else abscissae.size):
             eta = (y - e + noise * abscissae[k]) / w
             f, slope, _ = section_at(eta, own)
             dense, steeper, _ = crowded(slope, h / w, even)
@@ -134,7 +142,10 @@ def section_scores(
             if not 0.0 <= place < spans:
                 continue
             first = np.int64(place)
-            low, high = min(low, first), max(high, first + 4)
+            if first < low:
+                low = first
+            if first + 4 > high:
+                high = first + 4
             t = place - first
             s = 1.0 - t
             crowd = shares[k] * steeper * spans / wider
