@@ -11,7 +11,7 @@ from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
 from ridgefeature.kernels.strip import TERMS, C, E, H, W, offsets
-from ridgefeature.noise import Noise, first_noise
+from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
@@ -119,6 +119,8 @@ def fit_whole(
     state: State | None = _begun(task, section, before)
     if state is not None and task.steep and before is None and shaping:
         state = likeliest(task, state)
+    if shared and state is not None:
+        state = state.lying(evenness(some, state.terms, state.section, state.noise))
     if shared and task.steep and state is not None:
         state = likelier(task, points, state, shaping)
         return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit)
