@@ -32,6 +32,8 @@ MOST_POINTS, SOME_POINTS = 300_000, 20_000
 """As many are looked at in the last round, and before it."""
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
+_MANY_STRAYS = 0.03
+"""Share of strays from which on they may hide how evenly the others lie."""
 _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _BESIDE = 3.0
@@ -120,10 +122,9 @@ def fit_whole(
     if state is not None and task.steep and before is None and shaping:
         state = likeliest(task, state)
     if shared and state is not None:
-        state = state.lying(evenness(some, state.terms, state.section, state.noise))
-    if shared and task.steep and state is not None:
-        state = likelier(task, points, state, shaping)
-        return None if state is None or state.fit is None else _joint(points, some, path, state, state.fit)
+        state = _lying_as_told(task, state)
+        if task.steep:
+            state, rounds = likelier(task, points, state, shaping), 0
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
@@ -149,6 +150,14 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
         return State(terms, section, before.noise, before.smooth.weights)
     known = before.smooth.weights, before.inflation, before.smooth.freedom
     return State(before.terms, section, before.noise, *known)
+
+
+def _lying_as_told(task: Task, state: State) -> State:
+    """With points that lie as evenly as is told now, where strays or a start far off told it wrong before."""
+    noise = state.noise
+    if not task.steep and noise.strays < _MANY_STRAYS:
+        return state
+    return state.lying(evenness(task.some, state.terms, state.section, noise))
 
 
 def _reshaped(task: Task, state: State) -> State:
