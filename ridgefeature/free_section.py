@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,14 +15,15 @@ from ridgefeature.kernels.section_sums import cell_sums, spline_sums
 from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.one_hump import one_hump, symmetric_hump
 from ridgefeature.section import Section, box
-from ridgefeature.smearing import Smeared
-from ridgefeature.unseen import unseen_std
+from ridgefeature.smearing import Smeared, likelihood_section_scores
 
 Array = NDArray[np.float64]
 
 SPANS = 40
 """Of the free spline, over WIDER widths."""
 WIDER = 1.25
+Told = Callable[[int, float], tuple[Array, Array]]
+"""Normal equations of a section of so many spans over so many widths, and of changes of the base."""
 FREE = "free"
 LEARNED = "learned"
 _LOW = (0.04, 0.1, 0.25)
@@ -39,6 +41,8 @@ _ROUNDS = 8
 _LEAST_SPANS = 20
 _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 """Of three coefficients, in the height at the middle one's knot."""
+_HIGH = 0.9
+"""Height of the top."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -71,41 +75,60 @@ class FreeSection:
 
 
 def free_section(
-    points: Array,
-    terms: Array,
-    seen: Smeared,
-    noise: tuple[float, float],
+    told: Told,
+    section: Section,
+    count: int,
     spans: int,
     price: float,
     wider: float = WIDER,
+    split: bool = False,
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
-    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section before, smeared;
-    noise: scale and strays' density; price: of a coefficient, in twice the log likelihood ratio. It spans
-    `wider` widths: where its feet are `trimmed` tells once it is final.
+    told: what so many points say of it (`by_means`, `by_likelihood`); section: the one before; price: of a
+    coefficient, in twice the log likelihood ratio. It spans `wider` widths: where its feet are `trimmed`
+    tells once it is final. split: its top is as smooth as the points ask for there: as rough as steep flanks
+    it would rise to a spike where one hump is asked for.
     """
-    matrix, right = _sums(points, terms, seen, noise, spans, wider)
-    told = np.diagonal(matrix)
-    if not (np.isfinite(matrix).all() and (told[-3:] > 0).all() and (told[:-3] > 0).any()):
+    matrix, right = told(spans, wider)
+    known = np.diagonal(matrix)
+    if not (np.isfinite(matrix).all() and (known[-3:] > 0).all() and (known[:-3] > 0).any()):
         return None
-    found, freedom, inverse = _smoothest(matrix, right, spans)
+    top = _top(section, spans, wider) if split else None
+    found, freedom, inverse = _smoothest(matrix, right, spans, top)
     if not found[3:-6].max() > 0:
         return None
     cost = 0.5 * price * freedom
-    found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * len(points), cost))
+    found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * count, cost))
     if not np.convolve(found[3:-6], _AT_KNOT).max() > 0:
         return None
-    gain = _gain(matrix, right, found, seen.section, spans, wider)
+    gain = _gain(matrix, right, found, section, spans, wider)
     return FreeSection(found, wider, gain, part * freedom, shift * wider / spans)
 
 
-def _sums(
-    points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], spans: int, wider: float
-) -> tuple[Array, Array]:
-    """Normal equations of a section of so many spans, and of changes of the base."""
+def by_means(points: Array, terms: Array, seen: Smeared, noise: tuple[float, float]) -> Told:
+    """What points say of a section by their mean heights.
+
+    points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; seen: the section as it is,
+    smeared; noise: scale and strays' density.
+    """
     sums, base_matrix, base_right = cell_sums(points, terms, seen.told, *noise)
-    return spline_sums(sums, seen.basis(spans, wider), base_matrix, base_right)
+    return lambda spans, wider: spline_sums(sums, seen.basis(spans, wider), base_matrix, base_right)
+
+
+def by_likelihood(
+    points: Array, terms: Array, section: Section, noise: tuple[float, float, float, float]
+) -> Told:
+    """The same by their likelihood itself; noise: as `smearing.log_likelihood` has it."""
+
+    def told(spans: int, wider: float) -> tuple[Array, Array]:
+        matrix, right = likelihood_section_scores(points, terms, section, *noise, spans, wider)
+        sites, nearest = _nearest_spline(spans)
+        old = nearest @ section((sites - 0.5) * wider)
+        right += matrix[:, : spans + 3] @ old
+        return matrix, right
+
+    return told
 
 
 def trimmed(section: Section) -> tuple[Section, float, float]:
@@ -130,16 +153,14 @@ class SectionStd:
     """Of its place."""
 
 
-def section_std(
-    points: Array, terms: Array, seen: Smeared, noise: tuple[float, float], inflation: float
-) -> SectionStd:
-    """How sure a learned section is; arguments as for `free_section`. One that has a name is as sure as its
-    flanks were seen."""
-    section, gap = seen.section, unseen_std(points, terms, seen, noise[0])
+def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> SectionStd:
+    """How sure a learned section is; arguments as for `free_section`, and `unseen_std` of its flanks. One
+    that has a name is as sure as these."""
+    section = seen.section
     if section.name not in (LEARNED, FREE, box().name):
         return SectionStd(half_height_width=gap, width=gap)
     spans = section.spans
-    matrix, right = _sums(points, terms, seen, noise, spans, 1.0)
+    matrix, right = told(spans, 1.0)
     inverse = _smoothest(matrix, right, spans)[2]
     covariance = inflation * inverse[:-3, :-3]
     eta = np.linspace(-0.5, 0.5, 2001)
@@ -165,28 +186,45 @@ def section_std(
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
 
-def _smoothest(matrix: Array, right: Array, spans: int) -> tuple[Array, float, Array]:
+def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
+    """Which knots (spans + 1,) of a spline over `wider` widths lie on the top of a section."""
+    f = section((np.arange(spans + 1) / spans - 0.5) * wider)
+    high = np.flatnonzero(f > _HIGH)
+    top = np.zeros(spans + 1, dtype=np.bool_)
+    top[high[0] + 1 : high[-1]] = True
+    return top
+
+
+def _smoothest(
+    matrix: Array, right: Array, spans: int, top: NDArray[np.bool_] | None = None
+) -> tuple[Array, float, Array]:
     """Coefficients of largest restricted likelihood (as in ridgefeature.smoothing), effective number and
-    covariance."""
+    covariance.
+
+    top (spans + 1,): which knots are on the top: as smooth by itself, not as rough as steep flanks ask for.
+    """
     n = spans + 3
     d = np.zeros((n - 2, len(matrix)))
     d[:, :n] = np.diff(np.eye(n), 2, axis=0)
-    penalty = d.T @ d
+    parts = [d] if top is None or top.all() or not top.any() else [d[~top], d[top]]
+    penalties = np.array([part.T @ part for part in parts])
     # Feet: the section ends flat.
     pinned = np.zeros(len(matrix))
     pinned[[0, 1, 2, n - 3, n - 2, n - 1]] = 1e3 * np.diagonal(matrix)[:n].max()
     size = float(np.diagonal(matrix)[:n].mean())
-    lam = 1e-3 * size
+    lam = np.full(len(parts), 1e-3 * size)
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        inverse = np.asarray(np.linalg.inv(matrix + lam * penalty + ridge), dtype=np.float64)
+        held = np.tensordot(lam, penalties, 1) + ridge
+        inverse = np.asarray(np.linalg.inv(matrix + held), dtype=np.float64)
         found = inverse @ right
-        rough = float(((d @ found) ** 2).sum())
-        free = max(n - 2 - lam * float((penalty * inverse).sum()), 1e-2)
+        rough = np.array([((part @ found) ** 2).sum() for part in parts])
+        tied = lam * (penalties * inverse).sum(axis=(1, 2))
+        free = np.maximum([len(part) for part in parts] - tied, 1e-2)
         # Always as many rounds: stopping early would let rounding decide on the result.
-        low, high = max(1e-2 * lam, 1e-9 * size), min(1e2 * lam, 1e6 * size)
-        lam = float(np.clip(free / max(rough, 1e-300), low, high))
-    return found, free, inverse
+        low, high = np.maximum(1e-2 * lam, 1e-9 * size), np.minimum(1e2 * lam, 1e6 * size)
+        lam = np.clip(free / np.maximum(rough, 1e-300), low, high)
+    return found, float(free.sum()), inverse
 
 
 def _humped(

@@ -12,14 +12,16 @@ from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
 from ridgefeature.kernels.strip import TERMS, C, H, W, offsets, places_across
-from ridgefeature.noise import Noise, first_noise
+from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
-from ridgefeature.shaping import between_feet, shaped
+from ridgefeature.shaping import between_feet, shaped, told_of
 from ridgefeature.smearing import Smeared
 from ridgefeature.smoothing import Smooth, basis_at
+from ridgefeature.steep_end import likelier
 from ridgefeature.steep_start import likeliest
+from ridgefeature.unseen import unseen_std
 
 Array = NDArray[np.float64]
 
@@ -31,6 +33,8 @@ MOST_POINTS, SOME_POINTS = 300_000, 20_000
 """As many are looked at in the last round, and before it."""
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
+_MANY_STRAYS = 0.03
+"""Share of strays from which on they may hide how evenly the others lie."""
 _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _BESIDE = 3.0
@@ -67,11 +71,16 @@ class Joint:
 
     seen: Smeared
     """The section as points so noisy show it."""
+    exact: bool = False
+    """Whether by the likelihood of the points itself, not by mean heights."""
 
     @cached_property
     def section_std(self) -> SectionStd:
         """What the section, the same along the whole ridge, adds to standard deviations."""
-        return section_std(_some(self.points), self.terms, self.seen, self.noise.told, self.inflation)
+        some, noise = _some(self.points), self.noise
+        told = told_of(some, self.terms, self.seen, noise, self.exact)
+        gap = unseen_std(some, self.terms, self.seen, noise.scale)
+        return section_std(told, self.seen, gap, self.inflation)
 
     def without(self, term: int) -> Joint:
         """The same where one term is 0."""
@@ -138,11 +147,15 @@ def fit_whole(
     return None if state is None or state.fit is None else _joint(task, points, state, state.fit)
 
 
-def known_in_common(joint: Joint, flat: bool) -> Joint | None:
+def known_in_common(joint: Joint, settings: Settings, flat: bool) -> Joint | None:
     """The same fit to the same points where errors that those beside each other along the ridge have in
-    common are looked for; flat: as for `fit_whole`."""
+    common are looked for; a steep ridge is fitted by its likelihood itself. flat: as for `fit_whole`."""
     task = task_of(_some(joint.points), joint.path, flat)
-    state = improved(task, joint.points, _begun(task, joint.section, joint), 0, shared=True)
+    state: State | None = _lying_as_told(task, _begun(task, joint.section, joint))
+    if state is not None and task.steep:
+        state = likelier(task, joint.points, state, settings.section in FOUND)
+    else:
+        state = improved(task, joint.points, state, 0, shared=True)
     return None if state is None or state.fit is None else _joint(task, joint.points, state, state.fit)
 
 
@@ -163,6 +176,14 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
     return State(before.terms, section, before.noise, *known)
 
 
+def _lying_as_told(task: Task, state: State) -> State:
+    """With points that lie as evenly as is told now, where strays or a start far off told it wrong before."""
+    noise = state.noise
+    if not task.steep and noise.strays < _MANY_STRAYS:
+        return state
+    return state.lying(evenness(task.some, state.terms, state.section, noise))
+
+
 def _reshaped(task: Task, state: State) -> State:
     """With a free section if it is better; on steep flanks only if the exact likelihood says so too."""
     new = state.given(*shaped(task.some, state.terms, state.seen, state.noise, state.inflation))
@@ -177,7 +198,7 @@ def _joint(task: Task, points: Array, state: State, fit: Fit) -> Joint:
     terms, noise = state.terms, state.noise
     misfit = _misfit(task.some, terms, state.seen, noise.scale)
     told = fit.smooth, terms, state.section, fit.matrix, fit.goal, counts, misfit
-    return Joint(task.path, points, *told, noise, state.inflation, state.seen)
+    return Joint(task.path, points, *told, noise, state.inflation, state.seen, fit.exact)
 
 
 def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:

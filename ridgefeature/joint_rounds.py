@@ -14,7 +14,7 @@ from ridgefeature.kernels.strip import C, W, information, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame, wanted_differences
 from ridgefeature.section import Section
-from ridgefeature.smearing import Smeared, log_likelihood, smear
+from ridgefeature.smearing import Smeared, likelihood_scores, log_likelihood, smear
 from ridgefeature.smoothing import Smooth, basis_at, smoothest
 from ridgefeature.template import STEEP
 
@@ -34,6 +34,8 @@ class Fit:
     smooth: Smooth
     matrix: Array
     goal: Array
+    exact: bool = False
+    """Whether by the likelihood itself, not by mean heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,13 +101,20 @@ def _sizes(path: PathFrame) -> tuple[float, float]:
 
 
 def improved(
-    task: Task, points: Array, state: State | None, left: int, near: bool = False, shared: bool = False
+    task: Task,
+    points: Array,
+    state: State | None,
+    left: int,
+    near: bool = False,
+    shared: bool = False,
+    exact: bool = False,
 ) -> State | None:
     """All terms fitted again to points; None where nothing finite came of it.
 
     left: rounds still to come: until then what the terms miss is no stray yet. near: by the distances of the
     points from the nearest places of the section (ridgefeature.foot_points), all of them of `task`. shared:
-    errors that points beside each other along the ridge have in common are looked for.
+    errors that points beside each other along the ridge have in common are looked for. exact: by the
+    likelihood itself, from terms near its largest, not by mean heights.
     """
     if state is None:
         return None
@@ -115,6 +124,8 @@ def improved(
         _by_foot_points(points, state, *scales) if near else _linearised(points, task.some, state, *scales)
     )
     matrix, goal, noise, gain = found
+    if exact:
+        matrix, goal, gain = *_by_likelihood(points, replace(state, noise=noise)), 1.0
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
     inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
@@ -133,7 +144,7 @@ def improved(
     if not np.isfinite(terms).all():
         return None
     terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
-    fit = Fit(smooth, matrix, goal)
+    fit = Fit(smooth, matrix, goal, exact)
     return State(terms, state.section, noise, smooth.weights, inflation, smooth.freedom, fit)
 
 
@@ -162,6 +173,13 @@ def _linearised(
     gain = float(sums[3] ** 2 / (sums[2] * sums[1]))
     noise = replace(noise, scale=scale, strays=strays, density=density, blur=blur)
     return matrix, right, noise, gain
+
+
+def _by_likelihood(points: Array, state: State) -> tuple[Array, Array]:
+    """Normal equations of all stretches for changes of the terms, by the likelihood itself."""
+    noise = state.noise
+    told = noise.blur, noise.even, noise.strays, noise.span
+    return likelihood_scores(points, state.terms, state.section, *told)
 
 
 def _in_common(points: Array, state: State, noise: Noise) -> Array:

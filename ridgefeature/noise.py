@@ -25,6 +25,8 @@ _FEWEST = 60
 _BESIDE = 0.7
 """Distance from the spine in widths up to which points are counted to tell how evenly they lie."""
 _SOME_STRAYS = 0.05
+_NO_STRAY = 3.0
+"""Distance from the surface, in noise scales, up to which a point is no stray."""
 _STRIP, _FEW, _TOGETHER = 0.1, 3, 3
 """Breadth of strips in widths; fewest points of a part one width long; such parts looked at together."""
 _SURE = 3.0
@@ -57,6 +59,11 @@ class Noise:
         """As the kernels take it."""
         return self.scale, self.density
 
+    @property
+    def all(self) -> tuple[float, float, float, float]:
+        """As a likelihood takes it."""
+        return self.blur, self.even, self.strays, self.span
+
 
 def first_noise(
     points: Array, terms: Array, section: Section, h: float, w: float, even: float | None = None
@@ -83,8 +90,19 @@ def blur_of(points: Array, terms: Array, distances: Array, scale: float, span: f
     return min(mixture(beyond, np.abs(beyond), scale, _SOME_STRAYS, span, least, _FIRST_MIXTURE)[0], scale)
 
 
+def evenness(points: Array, terms: Array, section: Section, noise: Noise) -> float:
+    """0 where points lie evenly over the base, 1 where evenly over the surface, flanks too.
+
+    Told by those points that are no strays: these lie evenly over the base whatever the others do.
+    """
+    points = points[:: 1 + len(points) // _ENOUGH]
+    seen = smear(section, terms, noise.blur, noise.even).told
+    far = offsets(points, terms, seen, noise.scale)[1]
+    return _evenness(points[far < _NO_STRAY * noise.scale], terms, section, noise.blur)
+
+
 def _evenness(points: Array, terms: Array, section: Section, noise: float) -> float:
-    """0 where points lie evenly over the base, 1 where evenly over the surface, flanks too."""
+    """The same of points among which there are no strays."""
     h, w = float(np.median(np.abs(terms[:, H]))), float(np.median(terms[:, W]))
 
     def stretched(eta: Array) -> Array:

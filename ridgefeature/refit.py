@@ -79,7 +79,7 @@ def _as_known(found: Refit, settings: Settings) -> Refit:
     joint = found.joint
     if joint is None:
         return found
-    again = known_in_common(joint, found.flat)
+    again = known_in_common(joint, settings, found.flat)
     if again is None or not _sound(again):
         again = joint
     elif again.inflation > CORRELATED:

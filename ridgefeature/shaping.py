@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.free_section import FREE, LEARNED, SPANS, WIDER, free_section, trimmed
+from ridgefeature.free_section import (
+    FREE,
+    LEARNED,
+    SPANS,
+    WIDER,
+    Told,
+    by_likelihood,
+    by_means,
+    free_section,
+    trimmed,
+)
 from ridgefeature.kernels.strip import E, W
 from ridgefeature.noise import Noise
 from ridgefeature.section import Section, box
@@ -14,8 +24,15 @@ from ridgefeature.smearing import Smeared, smear
 Array = NDArray[np.float64]
 
 
+def told_of(points: Array, terms: Array, seen: Smeared, noise: Noise, exact: bool) -> Told:
+    """What points say of the section, by their mean heights or exactly; seen: as such noise smears it."""
+    if exact:
+        return by_likelihood(points, terms, seen.section, noise.all)
+    return by_means(points, terms, seen, noise.told)
+
+
 def shaped(
-    points: Array, terms: Array, seen: Smeared, noise: Noise, inflation: float
+    points: Array, terms: Array, seen: Smeared, noise: Noise, inflation: float, exact: bool = False
 ) -> tuple[Section, Array]:
     """The section and terms (n, 6), or a free section and its terms where that is better beyond doubt.
 
@@ -24,15 +41,16 @@ def shaped(
     noise was independent.
     """
     section, price = seen.section, np.log(len(points))
+    told = told_of(points, terms, seen, noise, exact)
     wider = 1.0 if section.name == FREE else WIDER
-    found = free_section(points, terms, seen, noise.told, SPANS, inflation * price, wider)
+    found = free_section(told, section, len(points), SPANS, inflation * price, wider, exact)
     if found is None or (section is not box() and found.gain / inflation < price * found.freedom):
         return section, terms
     return found.applied(terms)
 
 
 def between_feet(
-    points: Array, terms: Array, section: Section, noise: Noise, inflation: float
+    points: Array, terms: Array, section: Section, noise: Noise, inflation: float, exact: bool = False
 ) -> tuple[Section, Array]:
     """A free section and its terms between its feet, where it is fitted again; else as for `shaped`."""
     section, middle, breadth = trimmed(section)
@@ -40,7 +58,8 @@ def between_feet(
     terms[:, E] += middle * terms[:, W]
     terms[:, W] *= breadth
     seen, price = smear(section, terms, noise.blur, noise.even), inflation * np.log(len(points))
-    found = free_section(points, terms, seen, noise.told, section.spans, price, 1.0)
+    told = told_of(points, terms, seen, noise, exact)
+    found = free_section(told, section, len(points), section.spans, price, 1.0, exact)
     return (section, terms) if found is None else found.applied(terms, LEARNED)
 
 

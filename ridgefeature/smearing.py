@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.scores import scores, section_scores
 from ridgefeature.kernels.smeared import log_likelihood as kernel
 from ridgefeature.kernels.smeared import smeared, smeared_basis
 from ridgefeature.kernels.strip import H, W
@@ -87,13 +88,43 @@ def log_likelihood(
     a, b, c, e, h, w = (np.interp(points[:, 0], nodes, terms[:, k]) for k in range(terms.shape[1]))
     y = points[:, 1]
     own, sizes = np.column_stack([y - e, points[:, 2] - a - y * (b + c * y)]), np.column_stack([h, w])
+    rule = _fine_rule(h, w, section, noise)
+    return float(kernel(own, section.table, sizes, even, *rule, noise, strays, span))
+
+
+def likelihood_scores(
+    points: Array, terms: Array, section: Section, noise: float, even: float, strays: float, span: float
+) -> tuple[Array, Array]:
+    """Information (nodes - 1, 6, 6) and derivatives (nodes - 1, 6) of the same, of each stretch."""
+    rule = _fine_rule(terms[:, H], terms[:, W], section, noise)
+    return scores(points, terms, section.table, even, *rule, noise, strays, span)
+
+
+def likelihood_section_scores(
+    points: Array,
+    terms: Array,
+    section: Section,
+    noise: float,
+    even: float,
+    strays: float,
+    span: float,
+    spans: int,
+    wider: float,
+) -> tuple[Array, Array]:
+    """Information (spans + 6, spans + 6) and derivatives (spans + 6,) of the same with the coefficients of a
+    spline section of so many spans over `wider` widths, and with changes of the base."""
+    rule = _fine_rule(terms[:, H], terms[:, W], section, noise)
+    return section_scores(points, terms, section.table, even, *rule, noise, strays, span, spans, wider)
+
+
+def _fine_rule(h: Array, w: Array, section: Section, noise: float) -> tuple[Array, Array]:
+    """Places and shares of a quadrature up the flanks of a ridge of these heights and widths."""
     blur = float(np.clip(noise / np.median(w), _LEAST_BLUR, _MOST_BLUR))
     steepest = float(np.median(np.abs(h) / w) * np.abs(section(np.linspace(-0.5, 0.5, 401), 1)).max())
     # Up a flank the places of the quadrature stand no further apart than the noise reaches.
-    rule = _even_rule(
+    return _even_rule(
         blur, max(min(_FINE, _APART * blur / max(steepest, 1.0)), 2.0 * _REACH * blur / _MOST_PLACES)
     )
-    return float(kernel(own, section.table, sizes, even, *rule, noise, strays, span))
 
 
 def _rule(blur: float) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ _RARE = 3.0
 
 
 @njit(**INNER)
-def _section_at(eta: float, own: Columns) -> tuple[float, float, float]:
+def section_at(eta: float, own: Columns) -> tuple[float, float, float]:
     """Height of a section, its slope and second derivative."""
     constant, linear, quadratic, cubic = own
     spans = constant.size - 2.0
@@ -39,14 +39,16 @@ def _section_at(eta: float, own: Columns) -> tuple[float, float, float]:
 
 
 @njit(**INNER)
-def _crowded(slope: float, steepness: float, even: float) -> tuple[float, float]:
-    """How many points lie over a unit of the base there, and how that changes with the section's slope.
+def crowded(slope: float, steepness: float, even: float) -> tuple[float, float, float]:
+    """How many points lie over a unit of the base there, and how that changes with the section's slope and
+    with the steepness.
 
     even: 0 where they lie evenly over the base, 1 where evenly over the surface.
     """
-    square = steepness * steepness
-    stretch = math.sqrt(1.0 + square * slope * slope)
-    return 1.0 + even * (stretch - 1.0), even * square * slope / stretch
+    rise = steepness * slope
+    stretch = math.sqrt(1.0 + rise * rise)
+    change = even * rise / stretch
+    return 1.0 + even * (stretch - 1.0), change * steepness, change * slope
 
 
 @njit(**OPTIONS)
@@ -65,7 +67,7 @@ def smeared(
     The mean height, its slope, its variance by that of the noise, the least and the largest height as far
     aside as noise may well carry points, and the derivative of the mean with the apex height, by which steep
     places are crowded too. table: as in Section; blur (m,): standard deviations of the noise; steepness (m,):
-    apex heights in widths; even: as in `_crowded`; abscissae, shares (k,): of a quadrature over the standard
+    apex heights in widths; even: as in `crowded`; abscissae, shares (k,): of a quadrature over the standard
     normal distribution.
     """
     own = split(table)
@@ -74,11 +76,11 @@ def smeared(
         square = 1.0 / (blur[m] * blur[m])
         for i in range(cells + 1):
             eta = (2.0 * i / cells - 1.0) * reach
-            level = _section_at(eta, own)[0]
+            level = section_at(eta, own)[0]
             d = d1 = n = n1 = v = g = g1 = 0.0
             for k in range(abscissae.size):
-                f, slope, bow = _section_at(eta + blur[m] * abscissae[k], own)
-                dense, steeper = _crowded(slope, steepness[m], even)
+                f, slope, bow = section_at(eta + blur[m] * abscissae[k], own)
+                dense, steeper, _ = crowded(slope, steepness[m], even)
                 dense, steeper = shares[k] * dense, shares[k] * steeper
                 change = steeper * bow
                 f -= level  # so that no digits are lost where there is little noise
@@ -99,7 +101,7 @@ def smeared(
             low = high = level
             for k in range(abscissae.size):
                 if abs(abscissae[k]) <= near:
-                    f = _section_at(eta + blur[m] * abscissae[k], own)[0]
+                    f = section_at(eta + blur[m] * abscissae[k], own)[0]
                     low, high = min(low, f), max(high, f)
             out[m, i, LOW], out[m, i, HIGH] = low, high
     return out
@@ -127,8 +129,8 @@ def smeared_basis(
     for i in range(places.size):
         d = mean = 0.0
         for k in range(abscissae.size):
-            f, slope, _ = _section_at(places[i] + blur * abscissae[k], own)
-            dense = shares[k] * _crowded(slope, steepness, even)[0]
+            f, slope, _ = section_at(places[i] + blur * abscissae[k], own)
+            dense = shares[k] * crowded(slope, steepness, even)[0]
             d += dense
             mean += dense * f
         mean /= d
@@ -137,8 +139,8 @@ def smeared_basis(
             place = (eta / wider + 0.5) * spans
             if not 0.0 <= place < spans:
                 continue
-            f, slope, _ = _section_at(eta, own)
-            dense, steeper = _crowded(slope, steepness, even)
+            f, slope, _ = section_at(eta, own)
+            dense, steeper, _ = crowded(slope, steepness, even)
             dense, steeper = shares[k] * dense / d, shares[k] * steeper * (f - mean) * per_eta / d
             first = np.int64(place)
             t = place - first
@@ -207,8 +209,8 @@ def log_likelihood(
         h, w = sizes[i, 0], sizes[i, 1]
         d = n = 0.0
         for k in range(abscissae.size):
-            f, slope, _ = _section_at((points[i, 0] + noise * abscissae[k]) / w, own)
-            dense = shares[k] * _crowded(slope, h / w, even)[0]
+            f, slope, _ = section_at((points[i, 0] + noise * abscissae[k]) / w, own)
+            dense = shares[k] * crowded(slope, h / w, even)[0]
             r = (points[i, 1] - h * f) / noise
             d += dense
             n += dense * math.exp(-0.5 * min(r * r, 1e3))
