@@ -1,13 +1,19 @@
-"""What is left of a march that went astray: the longest stretch that is alike."""
+"""What is left of a march that went astray: what is alike, or all but outgrown ends."""
 
 from __future__ import annotations
 
 from dataclasses import fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ridgefeature.stations import Stations
 
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+OUTGROWN = 2.5
+"""Width, in that usual of a ridge, from which on it is another one's."""
 SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end, or that went astray."""
 _ALIKE, _ASTRAY = 1.33, 1.6
@@ -32,5 +38,27 @@ def core_of(stations: Stations) -> Stations | None:
     if high - low < SHORTEST * usual:
         return None
     kept = (s >= low) & (s <= high)
+    return _part(stations, kept)
+
+
+def without_outgrown(stations: Stations, open_ends: tuple[bool, bool]) -> Stations:
+    """The stations without open ends that are far wider than the ridge usually is: another rise under it.
+
+    Such an end has so many points that the section would be its own.
+    """
+    s, usual = stations.arc_length, float(np.median(stations.width))
+    first, last = usual_ends(stations.width, open_ends)
+    if s[last] - s[first] < SHORTEST * usual:
+        return stations
+    return _part(stations, (s >= s[first]) & (s <= s[last]))
+
+
+def usual_ends(width: Array, open_ends: tuple[bool, bool]) -> tuple[int, int]:
+    """The first and the last place of a ridge that is no wider than it usually is, or that is no open end."""
+    alike = np.flatnonzero(width <= OUTGROWN * np.median(width))
+    return (int(alike[0]) if open_ends[0] else 0), (int(alike[-1]) if open_ends[1] else len(width) - 1)
+
+
+def _part(stations: Stations, kept: Flags) -> Stations:
     parts = {f.name: getattr(stations, f.name)[kept] for f in fields(Stations)}
-    return Stations(**{**parts, "arc_length": s[kept] - s[kept][0]})
+    return Stations(**{**parts, "arc_length": parts["arc_length"] - parts["arc_length"][0]})

@@ -91,7 +91,7 @@ def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick:
     closed, stop = track.closed, track.stop
     if settings.measure == "residual":
         ends = not stop[0].startswith(GOES_ON), not stop[1].startswith(GOES_ON)
-        found = fitted_over_ground(grid, stations, section, closed, ends, settings)
+        found = fitted_over_ground(grid, stations, section, closed, ends, settings, pick)
         stations, intervals = found.stations, found.end_interval
         section = section if found.joint is None else found.joint.section
         if found.closed:
