@@ -1,4 +1,4 @@
-"""What is left of a march that went astray: what is alike, or all but outgrown ends."""
+"""What is left of a march that went astray: what is alike, or all but ends of quite another width."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ridgefeature.stations import Stations
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-OUTGROWN = 2.5
-"""Width, in that usual of a ridge, from which on it is another one's."""
+OTHER_WIDTH = 2.5
+"""Factor between a width and that usual of a ridge from which on it is another one's."""
 SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end, or that went astray."""
 _ALIKE, _ASTRAY = 1.33, 1.6
@@ -41,21 +41,23 @@ def core_of(stations: Stations) -> Stations | None:
     return _part(stations, kept)
 
 
-def without_outgrown(stations: Stations, open_ends: tuple[bool, bool]) -> Stations:
-    """The stations without open ends that are far wider than the ridge usually is: another rise under it.
+def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Stations:
+    """The stations without open ends that are far wider than the ridge usually is, or far narrower.
 
-    Such an end has so many points that the section would be its own.
+    Another rise under it has so many points that the section would be its own.
     """
     s, usual = stations.arc_length, float(np.median(stations.width))
-    first, last = usual_ends(stations.width, open_ends)
+    first, last = usual_ends(s, stations.width, open_ends)
     if s[last] - s[first] < SHORTEST * usual:
         return stations
     return _part(stations, (s >= s[first]) & (s <= s[last]))
 
 
-def usual_ends(width: Array, open_ends: tuple[bool, bool]) -> tuple[int, int]:
-    """The first and the last place of a ridge that is no wider than it usually is, or that is no open end."""
-    alike = np.flatnonzero(width <= OUTGROWN * np.median(width))
+def usual_ends(at: Array, width: Array, open_ends: tuple[bool, bool]) -> tuple[int, int]:
+    """The first and the last place of a ridge that is about as wide as it usually is; of an end that is not
+    open the very end. at (n,): arc lengths of the places, of which there may be more where it is narrow."""
+    usual = float(np.median(np.interp(np.linspace(at[0], at[-1], len(at)), at, width)))
+    alike = np.flatnonzero((width <= OTHER_WIDTH * usual) & (OTHER_WIDTH * width >= usual))
     return (int(alike[0]) if open_ends[0] else 0), (int(alike[-1]) if open_ends[1] else len(width) - 1)
 
 

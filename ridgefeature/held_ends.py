@@ -44,7 +44,7 @@ def held(joint: Joint, open_ends: tuple[bool, bool], kept: float | None = None) 
     end = _on_top(misfit[:, 2], same_ridge(joint, 0, n, before)) if open_ends[1] else n
     turned = replace(joint, misfit=misfit[::-1], terms=terms[::-1])
     start = _on_top(misfit[::-1, 2], same_ridge(turned, 0, n, n - after)) if open_ends[0] else n
-    low, high = usual_ends(terms[:, W], open_ends)
+    low, high = usual_ends(at, terms[:, W], open_ends)
     return float(at[max(n - start, min(low, after))]), float(at[min(end, max(high, before))])
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.astray import SHORTEST, core_of, without_outgrown
+from ridgefeature.astray import SHORTEST, core_of, as_wide_as_usual
 from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
@@ -100,7 +100,7 @@ def _refitted(
     """The same of all these stations, and whether it is sound to the end."""
     flat = settings.flat
     if not closed:
-        stations = without_outgrown(stations, open_ends)
+        stations = as_wide_as_usual(stations, open_ends)
     stations, section = _upright(grid, stations, section, closed, settings, flat)
     first = _fit(grid, path_frame(stations, closed), section, settings, None, flat)
     if first is None:

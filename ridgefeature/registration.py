@@ -25,7 +25,7 @@ from ridgefeature.starts import LADDER, Hints
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.valley import fitted_over_ground
-from ridgefeature.verdict import no_ridge, too_large, unknown_height
+from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick:
         section = section if found.joint is None else found.joint.section
         if found.closed:
             closed, stop = True, (CLOSED, CLOSED)
-        why = unknown_height(stations)
+        why = unknown_height(stations) or fin(stations.height, float(np.median(stations.width)), settings)
         if why:
             raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
     return Ridge(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
 from ridgefeature.march import GOES_ON, Track
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
 from ridgefeature.window import Window
+
+Array = NDArray[np.float64]
 
 _UNKNOWN = 0.5
 """Standard deviation of the height, in heights, beyond which most of a ridge is not told from its base."""
@@ -19,10 +22,17 @@ def too_large(track: Track, extent: float, settings: Settings) -> str:
     width = float(np.median([t.width for t in track.templates]))
     if width > settings.widest * extent:
         return f"what rises there is {width:.4g} wide, on a scan of about {extent:.4g}"
-    height = float(np.median([abs(t.height) for t in track.templates]))
-    if height > settings.steepest * width:
-        return f"what rises there is {height:.4g} high and {width:.4g} wide"
-    return ""
+    return fin(np.array([t.height for t in track.templates]), width, settings)
+
+
+def fin(height: Array, width: float, settings: Settings) -> str:
+    """Why heights on so wide a foot are a mere fin's, as of an edge that is taken for a ridge; else empty."""
+    usual = float(np.median(np.abs(height)))
+    return (
+        f"what rises there is {usual:.4g} high and {width:.4g} wide"
+        if usual > settings.steepest * width
+        else ""
+    )
 
 
 def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings) -> str:

@@ -7,7 +7,7 @@ import pytest
 from oracles import straight_ridge, template_at
 
 import ridgefeature as rf
-from ridgefeature.astray import OUTGROWN, without_outgrown
+from ridgefeature.astray import OTHER_WIDTH, as_wide_as_usual, usual_ends
 from ridgefeature.grid import build_grid
 from ridgefeature.path_frame import path_frame, points_along
 from ridgefeature.refit import Refit, refitted
@@ -107,8 +107,15 @@ def test_ends_far_wider_than_the_ridge_are_another_rise(open_ends):
     widths = [40.0, 16.0, *(8 * [8.0]), 16.0, 40.0]
     templates = [t.changed(width=w) for t, w in zip(known(*np.arange(0.0, 72.0, 6.0)), widths, strict=True)]
     stations = lay_out(tuple(templates), SETTINGS, False)
-    kept = without_outgrown(stations, open_ends)
+    kept = as_wide_as_usual(stations, open_ends)
     for end, may_move in ((0, open_ends[0]), (-1, open_ends[1])):
-        assert (kept.width[end] <= OUTGROWN * np.median(stations.width)) == may_move
+        assert (kept.width[end] <= OTHER_WIDTH * np.median(stations.width)) == may_move
         assert np.array_equal(kept.spine[end], stations.spine[end]) != may_move
     assert kept.arc_length[0] == 0.0
+
+
+def test_what_is_usual_is_told_by_arc_length():
+    """Nodes of a path lie closer where it is narrow: many of them are no long stretch."""
+    at = np.concatenate([np.linspace(0.0, 60.0, 11), np.linspace(60.2, 70.0, 50)])
+    width = np.where(at < 61.0, 8.0, 1.0)
+    assert usual_ends(at, width, (True, True)) == (0, int(np.flatnonzero(at < 61.0)[-1]))
