@@ -48,7 +48,7 @@ def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Statio
     """
     s, usual = stations.arc_length, float(np.median(stations.width))
     first, last = usual_ends(s, stations.width, open_ends)
-    if s[last] - s[first] < SHORTEST * usual:
+    if last - first == len(s) - 1 or s[last] - s[first] < SHORTEST * usual:
         return stations
     return _part(stations, (s >= s[first]) & (s <= s[last]))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.astray import SHORTEST, core_of, as_wide_as_usual
+from ridgefeature.astray import SHORTEST, as_wide_as_usual, core_of
 from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
