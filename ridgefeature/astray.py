@@ -58,6 +58,8 @@ def usual_ends(at: Array, width: Array, open_ends: tuple[bool, bool]) -> tuple[i
     open the very end. at (n,): arc lengths of the places, of which there may be more where it is narrow."""
     usual = float(np.median(np.interp(np.linspace(at[0], at[-1], len(at)), at, width)))
     alike = np.flatnonzero((width <= OTHER_WIDTH * usual) & (OTHER_WIDTH * width >= usual))
+    if not len(alike):
+        return 0, len(width) - 1
     return (int(alike[0]) if open_ends[0] else 0), (int(alike[-1]) if open_ends[1] else len(width) - 1)
 
 

@@ -110,7 +110,7 @@ def fit_whole(
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
     if len(points) < _FEWEST:
         return None
-    some = points[:: 1 + len(points) // SOME_POINTS]
+    some = np.ascontiguousarray(points[:: 1 + len(points) // SOME_POINTS])
     shaping = settings.section in FOUND
     task = task_of(some, path, flat)
     state: State | None = _begun(task, section, before)
