@@ -58,13 +58,13 @@ def same_ridge(joint: Joint, start: int, end: int, kept: int = 0) -> int:
     half = NODES_A_WIDTH // 2
     noise, sizes = _noise(joint, start, end), np.abs(joint.terms[:, [H, W]])
     cut = end
-    k, first = end - half, max(start, kept, end - _LATEST * NODES_A_WIDTH)
-    while k > first:
+    k, first = end - half, max(start, end - _LATEST * NODES_A_WIDTH)
+    while k > max(first, kept):
         beyond = k
         while k > first and noise[k] > _MISFIT:
             k -= 1
         if k < beyond and _leaves(noise, sizes[: end + 1], start, k + 1, beyond):
-            cut = k + 1 + half // 2
+            cut = max(k + 1 + half // 2, kept)
         k -= 1
     return cut
 

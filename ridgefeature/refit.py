@@ -61,12 +61,13 @@ def refitted(
     """The stations fitted again as a whole; as they were where there are too few points.
 
     open_ends: which ends may move, further out or back; pick (3,): where the ridge is known to be. Where no
-    sound fit goes along all stations, the march went astray: then along those that are alike.
+    sound fit goes along all stations, the march went astray: then along those that are alike, the pick among
+    them or not.
     """
     found, sound = _refitted(grid, stations, section, closed, open_ends, settings, pick)
     core = None if sound or closed else core_of(stations)
     if core is not None:
-        again, sound = _refitted(grid, core, section, closed, (True, True), settings, pick)
+        again, sound = _refitted(grid, core, section, closed, (True, True), settings, None)
         found = again if sound else found
     return _as_known(grid, found, settings) if sound else found
 
