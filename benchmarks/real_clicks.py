@@ -46,11 +46,12 @@ FOUND, ON_TOP, PLACES = 0.8, 0.9, 200
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A ridge in a scan: its crest (m, 3), what was read off, and which way is up."""
+    """A ridge in a scan: its crest (m, 3), what was read off, which way is up, and where to click (3,)."""
 
     name: str
     points: Array
     up: Array
+    seed: Array
     crest: Array
     length: float
     height: float
@@ -90,11 +91,11 @@ def tracks(folder: Path) -> Iterator[Track]:
         data = np.load(folder / f"{file}.npz")
         kind = "auto" if "groove" in file else "ridge"
         for k, (name, sizes) in enumerate(read.items()):
-            crest = data["ref_path" + (f"_{k + 1}" if k else "")]
+            crest, seed = (data[what + (f"_{k + 1}" if k else "")] for what in ("ref_path", "seed"))
             for cloud in ("points", "points_sampled"):
                 if cloud in data:
                     label = f"{file} {name}{', sampled' if cloud != 'points' else ''}"
-                    yield Track(label, data[cloud], data["up"], crest, *sizes, kind)
+                    yield Track(label, data[cloud], data["up"], seed, crest, *sizes, kind)
     yield from mountains()
 
 
@@ -107,7 +108,8 @@ def mountains() -> Iterator[Track]:
     points = np.column_stack([74.5 * column.ravel(), 92.5 * (len(z) - 1 - row).ravel(), z.ravel()])
     for name, (start, way, length, height, width) in MOUNTAINS.items():
         crest = highest(points, np.array(start, float), np.array(way), length, width)
-        yield Track(name, points, np.array([0.0, 0.0, 1.0]), crest, length, height, width)
+        seed = points[np.argmin(((points[:, :2] - start) ** 2).sum(axis=1))]
+        yield Track(name, points, np.array([0.0, 0.0, 1.0]), seed, crest, length, height, width)
 
 
 def highest(points: Array, at: Array, way: Array, length: float, width: float) -> Array:

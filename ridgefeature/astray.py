@@ -1,13 +1,19 @@
-"""What is left of a march that went astray: the longest stretch that is alike."""
+"""What is left of a march that went astray: what is alike, or all but ends of quite another width."""
 
 from __future__ import annotations
 
 from dataclasses import fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ridgefeature.stations import Stations
 
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+OTHER_WIDTH = 2.5
+"""Factor between a width and that usual of a ridge from which on it is another one's."""
 SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end, or that went astray."""
 _ALIKE, _ASTRAY = 1.33, 1.6
@@ -32,5 +38,31 @@ def core_of(stations: Stations) -> Stations | None:
     if high - low < SHORTEST * usual:
         return None
     kept = (s >= low) & (s <= high)
+    return _part(stations, kept)
+
+
+def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Stations:
+    """The stations without open ends that are far wider than the ridge usually is, or far narrower.
+
+    Another rise under it has so many points that the section would be its own.
+    """
+    s, usual = stations.arc_length, float(np.median(stations.width))
+    first, last = usual_ends(s, stations.width, open_ends)
+    if last - first == len(s) - 1 or s[last] - s[first] < SHORTEST * usual:
+        return stations
+    return _part(stations, (s >= s[first]) & (s <= s[last]))
+
+
+def usual_ends(at: Array, width: Array, open_ends: tuple[bool, bool]) -> tuple[int, int]:
+    """The first and the last place of a ridge that is about as wide as it usually is; of an end that is not
+    open the very end. at (n,): arc lengths of the places, of which there may be more where it is narrow."""
+    usual = float(np.median(np.interp(np.linspace(at[0], at[-1], len(at)), at, width)))
+    alike = np.flatnonzero((width <= OTHER_WIDTH * usual) & (OTHER_WIDTH * width >= usual))
+    if not len(alike):
+        return 0, len(width) - 1
+    return (int(alike[0]) if open_ends[0] else 0), (int(alike[-1]) if open_ends[1] else len(width) - 1)
+
+
+def _part(stations: Stations, kept: Flags) -> Stations:
     parts = {f.name: getattr(stations, f.name)[kept] for f in fields(Stations)}
-    return Stations(**{**parts, "arc_length": s[kept] - s[kept][0]})
+    return Stations(**{**parts, "arc_length": parts["arc_length"] - parts["arc_length"][0]})

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.astray import usual_ends
 from ridgefeature.joint import Joint, least_noise
 from ridgefeature.kernels.strip import H, W
 from ridgefeature.path_frame import NODES_A_WIDTH
@@ -32,36 +33,38 @@ _EXPECTED, _FEWEST = 3.0, 0.15
 """Points on the top of a stretch that are waited for, and the part of them that must be there."""
 
 
-def held(joint: Joint, open_ends: tuple[bool, bool]) -> tuple[float, float]:
+def held(joint: Joint, open_ends: tuple[bool, bool], kept: float | None = None) -> tuple[float, float]:
     """Arc lengths of the joint's path between which the points hold what was fitted.
 
-    open_ends: which of both may move.
+    open_ends: which of both may move; kept: arc length of a place that is on the ridge, if one is known.
     """
     at, n = joint.path.at, len(joint.path.at) - 1
     misfit, terms = joint.misfit, joint.terms
-    end = _on_top(misfit[:, 2], same_ridge(joint, 0, n)) if open_ends[1] else n
+    before, after = (0, n) if kept is None else 2 * (int(np.argmin(np.abs(at - kept))),)
+    end = _on_top(misfit[:, 2], same_ridge(joint, 0, n, before)) if open_ends[1] else n
     turned = replace(joint, misfit=misfit[::-1], terms=terms[::-1])
-    start = _on_top(misfit[::-1, 2], same_ridge(turned, 0, n)) if open_ends[0] else n
-    return float(at[n - start]), float(at[end])
+    start = _on_top(misfit[::-1, 2], same_ridge(turned, 0, n, n - after)) if open_ends[0] else n
+    low, high = usual_ends(at, terms[:, W], open_ends)
+    return float(at[max(n - start, min(low, after))]), float(at[min(end, max(high, before))])
 
 
-def same_ridge(joint: Joint, start: int, end: int) -> int:
+def same_ridge(joint: Joint, start: int, end: int, kept: int = 0) -> int:
     """The node up to which a ridge from one node to another is the same one, looked at from its end.
 
     Where it runs into something else (a blob, a body, another ridge) its points no longer fit, and height or
     width leave what the stretch before showed, up to the end. What fits is the ridge, however it grows or
-    fades.
+    fades. kept: a node that is on it, whatever fits there.
     """
     half = NODES_A_WIDTH // 2
     noise, sizes = _noise(joint, start, end), np.abs(joint.terms[:, [H, W]])
     cut = end
     k, first = end - half, max(start, end - _LATEST * NODES_A_WIDTH)
-    while k > first:
+    while k > max(first, kept):
         beyond = k
         while k > first and noise[k] > _MISFIT:
             k -= 1
         if k < beyond and _leaves(noise, sizes[: end + 1], start, k + 1, beyond):
-            cut = k + 1 + half // 2
+            cut = max(k + 1 + half // 2, kept)
         k -= 1
     return cut
 

@@ -160,7 +160,7 @@ def known_in_common(joint: Joint, settings: Settings, flat: bool) -> Joint | Non
 
 
 def _some(points: Array) -> Array:
-    return points[:: 1 + len(points) // SOME_POINTS]
+    return np.ascontiguousarray(points[:: 1 + len(points) // SOME_POINTS])
 
 
 def _begun(task: Task, section: Section, before: Joint | None) -> State:

@@ -79,7 +79,7 @@ class Task:
 
     def thinned(self) -> Task:
         """With as many points as tell which of several states is the likeliest."""
-        return replace(self, some=self.some[:: 1 + len(self.some) // _TELLING])
+        return replace(self, some=np.ascontiguousarray(self.some[:: 1 + len(self.some) // _TELLING]))
 
 
 def task_of(some: Array, path: PathFrame, flat: bool) -> Task:
@@ -151,7 +151,7 @@ def improved(
 def chance(points: Array, state: State) -> float:
     """Log likelihood of the heights of points."""
     noise = state.noise
-    points = points[:: 1 + len(points) // _TELLING]
+    points = np.ascontiguousarray(points[:: 1 + len(points) // _TELLING])
     told = noise.blur, noise.even, noise.strays, noise.span
     return log_likelihood(points, state.terms, state.section, *told)
 

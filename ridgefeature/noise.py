@@ -69,7 +69,7 @@ def first_noise(
     points: Array, terms: Array, section: Section, h: float, w: float, even: float | None = None
 ) -> Noise:
     """The noise as some of the points tell it; even: how they lie, if that is known."""
-    points = points[:: 1 + len(points) // _ENOUGH]
+    points = np.ascontiguousarray(points[:: 1 + len(points) // _ENOUGH])
     seen = smear(section, terms, 0.0, 0.0).told
     distances, far = offsets(points, terms, seen, EXACT * h)
     scale = max(1.4826 * float(np.median(np.abs(distances))), EXACT * h)

@@ -54,11 +54,11 @@ def open_ends(stop: tuple[str, str]) -> tuple[bool, bool]:
 
 
 def followed(
-    rough: Window, full: Window, found: Refit, track: Track, settings: Settings
+    rough: Window, full: Window, found: Refit, track: Track, settings: Settings, pick: Array | None = None
 ) -> tuple[Refit, Track]:
     """The ridge fitted as a whole, marched on from its ends and fitted again while it goes on there.
 
-    The track with the templates that were added, and why it stopped then.
+    pick: as for `refitted`. The track with the templates that were added, and why it stopped then.
     """
     for _ in range(_TIMES):
         if found.joint is None or found.closed:
@@ -69,7 +69,7 @@ def followed(
             break
         chain, new = on
         ends = open_ends(new.stop)
-        again = fitted_over_ground(full.grid, lay_out(chain, settings), section, False, ends, settings)
+        again = fitted_over_ground(full.grid, lay_out(chain, settings), section, False, ends, settings, pick)
         if not _better(again, found):
             break
         found, track = again, new

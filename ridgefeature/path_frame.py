@@ -146,6 +146,9 @@ def points_along(grid: Grid, path: PathFrame, reach: Array, most: int) -> Array:
     """
     axes = path.tangent, path.left, path.normal
     boxes = boxes_around(_corners(path, reach), path.origin, *axes, _TOGETHER)
+    for array in boxes:
+        # As those of all other look-ups: a kernel is compiled for each kind of array.
+        array.setflags(write=False)
     cells = grid.starts, grid.levels, grid.frame
     count = count_along(*cells, *boxes) if len(grid.points) > most else len(grid.points)
     every = 1 + (count // most if len(grid.points) > most else 0)

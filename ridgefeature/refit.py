@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.astray import SHORTEST, core_of
+from ridgefeature.astray import SHORTEST, as_wide_as_usual, core_of
 from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole, known_in_common
@@ -56,16 +56,18 @@ def refitted(
     closed: bool,
     open_ends: tuple[bool, bool],
     settings: Settings,
+    pick: Array | None = None,
 ) -> Refit:
     """The stations fitted again as a whole; as they were where there are too few points.
 
-    open_ends: which ends may move, further out or back. Where no sound fit goes along all stations, the march
-    went astray: then along those that are alike.
+    open_ends: which ends may move, further out or back; pick (3,): where the ridge is known to be. Where no
+    sound fit goes along all stations, the march went astray: then along those that are alike, the pick among
+    them or not.
     """
-    found, sound = _refitted(grid, stations, section, closed, open_ends, settings)
+    found, sound = _refitted(grid, stations, section, closed, open_ends, settings, pick)
     core = None if sound or closed else core_of(stations)
     if core is not None:
-        again, sound = _refitted(grid, core, section, closed, (True, True), settings)
+        again, sound = _refitted(grid, core, section, closed, (True, True), settings, None)
         found = again if sound else found
     return _as_known(found, settings) if sound else found
 
@@ -94,12 +96,15 @@ def _refitted(
     closed: bool,
     open_ends: tuple[bool, bool],
     settings: Settings,
+    pick: Array | None,
 ) -> tuple[Refit, bool]:
     """The same of all these stations, and whether it is sound to the end.
 
     If so, the stations are those that the last fit went along: where it leads is laid out once, at the end.
     """
     flat = settings.flat
+    if not closed:
+        stations = as_wide_as_usual(stations, open_ends)
     stations, path, section = _upright(grid, stations, section, closed, settings, flat)
     first = _fit(grid, path, section, settings, None, flat)
     if first is None:
@@ -109,7 +114,7 @@ def _refitted(
         first = first.without(C)
     laid, intervals = stations_of(first, len(stations.arc_length), settings), None
     if not closed and any(open_ends):
-        laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat)
+        laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat, pick)
         ring = as_ring(laid)
         if ring is not None:
             laid, intervals, closed = ring, None, True
@@ -117,16 +122,23 @@ def _refitted(
     if joint is None:
         return Refit(laid, first, intervals, closed), False
     found = Refit(laid, joint, intervals, closed, flat)
-    return found if closed else _held(grid, found, open_ends, settings, flat), True
+    return found if closed else _held(grid, found, open_ends, settings, flat, pick), True
 
 
-def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Settings, flat: bool) -> Refit:
+def _held(
+    grid: Grid,
+    found: Refit,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+    flat: bool,
+    pick: Array | None,
+) -> Refit:
     """The open ridge cut at ends that its points do not hold, and fitted again without what lies beyond."""
     for _ in range(_CUTS):
         joint, known = found.joint, found.stations.arc_length
         if joint is None:
             break
-        start, end = held(joint, open_ends)
+        start, end = held(joint, open_ends, _place(joint.path, pick))
         length = end - start
         if length >= known[-1] or length < SHORTEST * float(np.median(joint.terms[:, W])):
             break
@@ -146,14 +158,20 @@ def _held(grid: Grid, found: Refit, open_ends: tuple[bool, bool], settings: Sett
 
 
 def _grown(
-    grid: Grid, laid: Stations, joint: Joint, open_ends: tuple[bool, bool], settings: Settings, flat: bool
+    grid: Grid,
+    laid: Stations,
+    joint: Joint,
+    open_ends: tuple[bool, bool],
+    settings: Settings,
+    flat: bool,
+    pick: Array | None,
 ) -> tuple[Stations, Array | None, Joint]:
     """Stations between the ends, these ends' intervals, and the fit that told them.
 
     A ridge that is seen further out than the march went may go on beyond what was looked at.
     """
     for _ in range(_GROWTHS):
-        laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat)
+        laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat, pick)
         if max(moved) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
@@ -161,6 +179,11 @@ def _grown(
             break
         joint, laid = again, stations_of(again, len(laid.arc_length), settings)
     return laid, intervals, joint
+
+
+def _place(path: PathFrame, pick: Array | None) -> float | None:
+    """The arc length at which a path is nearest to the pick."""
+    return None if pick is None else float(path.at[np.argmin(((path.origin - pick) ** 2).sum(axis=1))])
 
 
 def _upright(
@@ -196,6 +219,7 @@ def _between_ends(
     open_ends: tuple[bool, bool],
     settings: Settings,
     flat: bool,
+    pick: Array | None,
 ) -> tuple[Stations, Array | None, tuple[float, float]]:
     """The stations between the ends that all points along the path tell, and these ends' intervals; by how
     much both ends moved out."""
@@ -206,7 +230,7 @@ def _between_ends(
     wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None, (0.0, 0.0)
-    start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead)
+    start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead, _place(path, pick))
     if end - start < SHORTEST * float(np.median(stations.width)):
         return stations, None, (0.0, 0.0)
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start

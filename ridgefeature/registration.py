@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -21,11 +22,11 @@ from ridgefeature.rings import CLOSED, ring_or_not
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
-from ridgefeature.starts import Hints
+from ridgefeature.starts import LADDER, Hints
 from ridgefeature.stations import lay_out
 from ridgefeature.template import Template
 from ridgefeature.valley import fitted_over_ground
-from ridgefeature.verdict import no_ridge, unknown_height
+from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -33,6 +34,8 @@ KINDS = ("ridge", "groove", "auto")
 _ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
+_NARROWER = 6
+"""Steps of the ladder of widths by which narrower ridges are looked for on what is too large for one."""
 _CLUSTERED = 1.6
 """What a spacing by density is, in the median distance to the nearest point, where points lie in clusters or
 lines; on an even surface it is 0.5 (grids) to 1.25."""
@@ -40,6 +43,14 @@ lines; on an even surface it is 0.5 (grids) to 1.25."""
 
 class NoRidgeError(ValueError):
     """There is no ridge at the picked point."""
+
+
+class _TooLargeError(NoRidgeError):
+    """What was found there is too large for one; it began with a template of this width."""
+
+    def __init__(self, message: str, width: float) -> None:
+        super().__init__(message)
+        self.width = width
 
 
 def register(
@@ -77,11 +88,7 @@ def register(
     _check_pick(grid, pick, spacing, extent)
     full = Window(grid, spacing)
     rough = full.thinned(_ROUGH_POINTS)
-    try:
-        track = _track(rough, full, pick, extent, hints, settings, progress)
-    except NoRidgeError:
-        # What lies nearest to the pick is none: what explains most about it may be one.
-        track = _track(rough, full, pick, extent, hints, settings, progress, aimed=False)
+    track = _tried(rough, full, pick, extent, hints, settings, progress)
     return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
 
 
@@ -93,14 +100,14 @@ def _constructed(
     stations = lay_out(track.templates, settings, track.closed)
     closed, stop = track.closed, track.stop
     if settings.measure == "residual":
-        found = fitted_over_ground(grid, stations, section, closed, open_ends(stop), settings)
-        found, track = followed(rough, full, found, track, settings)
+        found = fitted_over_ground(grid, stations, section, closed, open_ends(stop), settings, pick)
+        found, track = followed(rough, full, found, track, settings, pick)
         stop = track.stop
         stations, intervals = found.stations, found.end_interval
         section = section if found.joint is None else found.joint.section
         if found.closed:
             closed, stop = True, (CLOSED, CLOSED)
-        why = unknown_height(stations)
+        why = unknown_height(stations) or fin(stations.height, float(np.median(stations.width)), settings)
         if why:
             raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
     return Ridge(
@@ -117,6 +124,32 @@ def _constructed(
     )
 
 
+def _tried(
+    rough: Window,
+    full: Window,
+    pick: Array,
+    extent: float,
+    hints: Hints,
+    settings: Settings,
+    progress: Progress | None,
+) -> Track:
+    """The track of what lies nearest to the pick; else of what explains most about it; else of what is
+    narrower than that, if that is no ridge for its size: a body that bears ridges explains far more."""
+    known = rough, full, pick, extent, hints, settings, progress
+    try:
+        return _track(*known, reach=extent)
+    except NoRidgeError:
+        pass
+    try:
+        return _track(*known, reach=extent, aimed=False)
+    except _TooLargeError as found:
+        refused = found
+    for n in range(0 if hints.width is not None else _NARROWER):
+        with suppress(NoRidgeError):
+            return _track(*known, reach=refused.width / LADDER ** (n + 1))
+    raise refused
+
+
 def _track(
     rough: Window,
     full: Window,
@@ -125,10 +158,14 @@ def _track(
     hints: Hints,
     settings: Settings,
     progress: Progress | None,
+    reach: float,
     aimed: bool = True,
 ) -> Track:
-    """The whole fit: march, ends placed, templates settled; settled again where another section is better."""
-    first = guess(rough, pick, extent, hints, first_section(settings), settings, aimed)
+    """The whole fit: march, ends placed, templates settled; settled again where another section is better.
+
+    reach: as far as ridges are looked for about the pick, `settings.widest` parts of which are their widths.
+    """
+    first = guess(rough, pick, reach, hints, first_section(settings), settings, aimed)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
@@ -141,7 +178,10 @@ def _track(
     track = place_ends(full, track, settings)
     track = settle_base(full, settle(full, track, settings), settings)
     track = finish_ends(full, track, settings)
-    why = no_ridge(rough, track, pick, extent, settings)
+    why = too_large(track, extent, settings)
+    if why:
+        raise _TooLargeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}", first.width)
+    why = no_ridge(rough, track, pick, settings)
     if why:
         raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
     settled = settings.measure == "M" or (

@@ -15,7 +15,7 @@ from ridgefeature.section import Section
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
-_LADDER = 1.4
+LADDER = 1.4
 _FEWEST = 30
 _PAST_BEST = 3
 """Widths in a row that explain far less than a smaller one did, after which no larger one is tried."""
@@ -89,7 +89,7 @@ def starts_about(window: Window, pick: Array, extent: float, hints: Hints, secti
     starts: list[Start] = []
     seen: list[tuple[Array, Array, float]] = []
     falling = 0
-    while radius <= _LADDER**_WIDER * last * (1 + 1e-9) and falling < _PAST_BEST:
+    while radius <= LADDER**_WIDER * last * (1 + 1e-9) and falling < _PAST_BEST:
         points = window.around(pick, radius, seen[-1][1] if seen else np.eye(3))
         if len(points) >= _FEWEST:
             seen.append((points, principal_axes(points), radius / 1.1))
@@ -97,7 +97,7 @@ def starts_about(window: Window, pick: Array, extent: float, hints: Hints, secti
             if found is not None:
                 falling = falling + 1 if _falls(found, starts) else 0
             starts += [s for s in (found, _turned(seen, hints, section)) if s is not None]
-        radius *= _LADDER
+        radius *= LADDER
     return sorted(starts, key=lambda start: -start.score)
 
 
@@ -132,7 +132,7 @@ def high_starts(window: Window, pick: Array, extent: float, hints: Hints, sectio
             ups = [np.cos(turn) * axes[:, 2] + np.sin(turn) * axes[:, 1] for turn in _TURNS]
             found = [_high_start(points, facing(up, along), widths, section) for up in ups]
             starts += sorted((s for s in found if s is not None), key=lambda s: -s.score)[:_OF_EACH]
-        radius *= _LADDER
+        radius *= LADDER
     return sorted(starts, key=lambda start: -start.score)[:_HIGH_TRIES]
 
 

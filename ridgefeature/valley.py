@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ridgefeature.grid import Grid
 from ridgefeature.refit import CORRELATED, Refit, refitted
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
+
+Array = NDArray[np.float64]
 
 _DEEP = 0.1
 """Depth of a hollow base under the spine, below its feet and in heights, from which on it is in doubt."""
@@ -27,6 +30,7 @@ def fitted_over_ground(
     closed: bool,
     open_ends: tuple[bool, bool],
     settings: Settings,
+    pick: Array | None = None,
 ) -> Refit:
     """The stations fitted again as a whole, as `refitted` does it, over the ground that the feet stand on.
 
@@ -35,11 +39,11 @@ def fitted_over_ground(
     correlated, and a level base close to the feet fits as well, that is taken.
     """
     told = closed, open_ends
-    found = refitted(grid, stations, section, *told, settings)
+    found = refitted(grid, stations, section, *told, settings, pick)
     if settings.flat or found.joint is None or found.joint.inflation < CORRELATED or not _hollow(found):
         return found
     near = replace(settings, base_chance=0.5, flank=min(_FLANK, settings.flank))
-    level = refitted(grid, replace(stations, curvature=np.zeros(0)), section, *told, near)
+    level = refitted(grid, replace(stations, curvature=np.zeros(0)), section, *told, near, pick)
     if level.joint is None or level.joint.noise.scale > _WORSE * found.joint.noise.scale:
         return found
     return level

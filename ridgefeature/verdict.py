@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
 from ridgefeature.march import GOES_ON, Track
@@ -10,23 +11,38 @@ from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
 from ridgefeature.window import Window
 
+Array = NDArray[np.float64]
+
 _UNKNOWN = 0.5
 """Standard deviation of the height, in heights, beyond which most of a ridge is not told from its base."""
 
 
-def no_ridge(window: Window, track: Track, pick: np.ndarray, extent: float, settings: Settings) -> str:
+def too_large(track: Track, extent: float, settings: Settings) -> str:
+    """Why what was found is as wide as the scan, or a mere fin; empty if it is neither."""
+    width = float(np.median([t.width for t in track.templates]))
+    if width > settings.widest * extent:
+        return f"what rises there is {width:.4g} wide, on a scan of about {extent:.4g}"
+    return fin(np.array([t.height for t in track.templates]), width, settings)
+
+
+def fin(height: Array, width: float, settings: Settings) -> str:
+    """Why heights on so wide a foot are a mere fin's, as of an edge that is taken for a ridge; else empty."""
+    usual = float(np.median(np.abs(height)))
+    return (
+        f"what rises there is {usual:.4g} high and {width:.4g} wide"
+        if usual > settings.steepest * width
+        else ""
+    )
+
+
+def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings) -> str:
     """Why what was found is no ridge; empty if it is one.
 
     Templates are asked from the pick on until they outweigh chance. A ridge that is found whole must be
-    longer than wide, and none may be as wide as the scan, or a mere fin.
+    longer than wide.
     """
     templates = track.templates
     width = float(np.median([t.width for t in templates]))
-    if width > settings.widest * extent:
-        return f"what rises there is {width:.4g} wide, on a scan of about {extent:.4g}"
-    height = float(np.median([abs(t.height) for t in templates]))
-    if height > settings.steepest * width:
-        return f"what rises there is {height:.4g} high and {width:.4g} wide"
     whole = not any(why.startswith(GOES_ON) for why in track.stop)
     length = sum(t.length for t in templates)
     if whole and length < settings.shortest * width:

@@ -73,20 +73,25 @@ def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
 
 
 def ends_of(
-    joint: Joint, start: float, end: float, open_ends: tuple[bool, bool], ahead: float
+    joint: Joint,
+    start: float,
+    end: float,
+    open_ends: tuple[bool, bool],
+    ahead: float,
+    kept: float | None = None,
 ) -> tuple[float, float]:
     """Arc lengths of the joint's path between which the ridge is, known so far from start to end.
 
     The joint was fitted further out. open_ends: which of both may move. ahead: widths
-    without data over which a ridge is followed.
+    without data over which a ridge is followed. kept: a place that is on it, if one is known.
     """
     one = min(NODES_A_WIDTH, len(joint.path.at) - 2)
     shown = (*evidence(joint, one), *evidence(joint, one // 2))
     if open_ends[1]:
-        end = _end_of(joint, shown, start, end, ahead)
+        end = _end_of(joint, shown, start, end, ahead, start if kept is None else kept)
     if open_ends[0]:
         backwards = tuple(values[::-1] for values in shown)
-        start = -_end_of(_backwards(joint), backwards, -end, -start, ahead)
+        start = -_end_of(_backwards(joint), backwards, -end, -start, ahead, -(end if kept is None else kept))
     return start, end
 
 
@@ -98,10 +103,12 @@ def _backwards(joint: Joint) -> Joint:
     return replace(joint, path=path, **turned)
 
 
-def _end_of(joint: Joint, shown: tuple[Array, ...], start: float, end: float, ahead: float) -> float:
+def _end_of(
+    joint: Joint, shown: tuple[Array, ...], start: float, end: float, ahead: float, kept: float
+) -> float:
     """Where a ridge ends whose last end is known to be near `end`.
 
-    shown: evidence and height of windows of one width and of a half.
+    shown: evidence and height of windows of one width and of a half; kept: a place that is on the ridge.
     """
     path = joint.path
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
@@ -115,7 +122,7 @@ def _end_of(joint: Joint, shown: tuple[Array, ...], start: float, end: float, ah
     k = _end(seen, height, dense, joint.terms[:, H], high, one, near, ahead * one + near)
     end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
     high = int(np.searchsorted(path.at, end, "right")) - 1
-    k = same_ridge(joint, low, high)
+    k = same_ridge(joint, low, high, int(np.argmin(np.abs(path.at - kept))))
     return end if k == high else float(path.at[k])
 
 

@@ -7,6 +7,7 @@ import pytest
 from oracles import straight_ridge, template_at
 
 import ridgefeature as rf
+from ridgefeature.astray import OTHER_WIDTH, as_wide_as_usual, usual_ends
 from ridgefeature.grid import build_grid
 from ridgefeature.path_frame import path_frame, points_along
 from ridgefeature.refit import Refit, refitted
@@ -88,3 +89,33 @@ def test_a_template_out_of_line_among_its_neighbours_is_left_out():
     assert in_line((*good[:5], low, *good[6:])) == (*good[:5], low, *good[6:])
     assert in_line((*good[:5], noisy, *good[6:])) == (*good[:5], noisy, *good[6:])
     assert in_line((poor, *good)) == (poor, *good)
+
+
+def test_the_ridge_goes_through_the_pick_whatever_it_runs_through():
+    """A hill beside the pick fits neither part; the longer part was kept, and the pick lost."""
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-10.0, 80.0, 14000), rng.uniform(-14.0, 14.0, 14000)
+    ridge = np.where((x >= 0.0) & (x <= 70.0), 2.0 * bell()(y / 6.0), 0.0)
+    hill = 4.0 * np.maximum(1.0 - ((x - 20.0) ** 2 + y**2) / 36.0, 0.0)
+    points = np.column_stack([x, y, np.maximum(ridge, hill)]) + rng.normal(0.0, 0.05, (14000, 3))
+    found = rf.register(points, at=(6.0, 0.0, 2.0))
+    assert np.linalg.norm(found.spine - (6.0, 0.0, 0.0), axis=1).min() < 1.0
+
+
+@pytest.mark.parametrize("open_ends", [(True, True), (False, True), (True, False)])
+def test_ends_far_wider_than_the_ridge_are_another_rise(open_ends):
+    widths = [40.0, 16.0, *(8 * [8.0]), 16.0, 40.0]
+    templates = [t.changed(width=w) for t, w in zip(known(*np.arange(0.0, 72.0, 6.0)), widths, strict=True)]
+    stations = lay_out(tuple(templates), SETTINGS, False)
+    kept = as_wide_as_usual(stations, open_ends)
+    for end, may_move in ((0, open_ends[0]), (-1, open_ends[1])):
+        assert (kept.width[end] <= OTHER_WIDTH * np.median(stations.width)) == may_move
+        assert np.array_equal(kept.spine[end], stations.spine[end]) != may_move
+    assert kept.arc_length[0] == 0.0
+
+
+def test_what_is_usual_is_told_by_arc_length():
+    """Nodes of a path lie closer where it is narrow: many of them are no long stretch."""
+    at = np.concatenate([np.linspace(0.0, 60.0, 11), np.linspace(60.2, 70.0, 50)])
+    width = np.where(at < 61.0, 8.0, 1.0)
+    assert usual_ends(at, width, (True, True)) == (0, int(np.flatnonzero(at < 61.0)[-1]))

@@ -63,7 +63,11 @@ def spline_sums(
     """
     n = basis.shape[2]
     matrix, right = np.zeros((n + BASE, n + BASE)), np.zeros(n + BASE)
-    matrix[n:, n:], right[n:] = base_matrix, base_right
+    # In loops: an assignment of a part of a matrix takes seconds to compile.
+    for k in range(BASE):
+        right[n + k] = base_right[k]
+        for p in range(BASE):
+            matrix[n + k, n + p] = base_matrix[k, p]
     for m in range(basis.shape[0]):
         for i in range(basis.shape[1]):
             if sums[m, i, 0] == 0.0:
