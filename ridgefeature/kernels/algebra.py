@@ -110,10 +110,19 @@ def moved(
             place[i] += rotation[i, j] * p[j]
             for k in range(3):
                 turned_axes[i, j] += rotation[i, k] * turn[k, j]
-    # Gram-Schmidt keeps long chains of products orthonormal.
+    return place, orthonormal(turned_axes), p[6], p[7]
+
+
+@njit(cache=True)
+def orthonormal(axes: Floats) -> Floats:
+    """Axes (3, 3), columns, made orthonormal (Gram and Schmidt).
+
+    Errors of rounding double with each frame that is told from the last one's transpose: at the end of a long
+    chain of them nothing else would be left.
+    """
     out = np.empty((3, 3))
     for j in range(3):
-        column = turned_axes[:, j].copy()
+        column = axes[:, j].copy()
         for k in range(j):
             dot = column[0] * out[0, k] + column[1] * out[1, k] + column[2] * out[2, k]
             for i in range(3):
@@ -121,7 +130,7 @@ def moved(
         size = math.sqrt(column[0] ** 2 + column[1] ** 2 + column[2] ** 2)
         for i in range(3):
             out[i, j] = column[i] / size
-    return place, out, p[6], p[7]
+    return out
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.algebra import facing
+from ridgefeature.kernels.algebra import facing, orthonormal
 
 Floats = NDArray[np.float64]
 
@@ -107,4 +107,4 @@ def standing(place: Floats, turn: Floats, terms: Floats) -> tuple[Floats, Floats
         for j in range(3):
             for k in range(3):
                 axes[i, j] += frame[i, k] * turn[k, j]
-    return position, axes
+    return position, orthonormal(axes)
