@@ -29,10 +29,9 @@ LEARNED = "learned"
 _LOW = (0.04, 0.1, 0.25)
 """Heights whose places tell where the feet are."""
 _ROOTS = np.array(_LOW) ** (1.0 / np.linspace(2.0, 3.0, 21)[:, None])
-_FOOT_STD = 0.037
-"""Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
-_FOOT_BLUR = 2.0
-"""Of the same, in deviations of the noise that smears it."""
+_FOOT_STD, _FOOT_BLUR = 0.037, 2.0
+"""Of the width between feet, in widths: whether they are parabolas or cubics is not seen; and in deviations of
+the noise that smears it."""
 _HALF_BLUR = 0.2
 """What that adds to the width at half height: how noise and points lie there is not known well."""
 _TOP = 0.95
@@ -215,8 +214,7 @@ def _smoothest(
     lam = np.full(len(parts), 1e-3 * size)
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        held = np.tensordot(lam, penalties, 1) + ridge
-        inverse = np.asarray(np.linalg.inv(matrix + held), dtype=np.float64)
+        inverse: Array = np.linalg.inv(matrix + np.tensordot(lam, penalties, 1) + ridge)
         found = inverse @ right
         rough = np.array([((part @ found) ** 2).sum() for part in parts])
         tied = lam * (penalties * inverse).sum(axis=(1, 2))
