@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ridgefeature.asked import hints_of, positive, settings_of, text_of, vector_of
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
@@ -29,7 +29,6 @@ from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
-KINDS = ("ridge", "groove", "auto")
 _ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
@@ -76,11 +75,11 @@ def register(
     is there.
     """
     scan = as_scan(scan)
-    pick = _vector(at, "at")
-    hints = _hints(direction, width, height, kind)
-    settings = _settings(settings, max_templates)
+    pick = vector_of(at, "at")
+    hints = hints_of(direction, width, height, kind)
+    settings = settings_of(settings, max_templates)
     if roi is not None:
-        scan = scan.crop(pick, _positive(roi, "roi"))
+        scan = scan.crop(pick, positive(roi, "roi"))
     grid = build_grid(scan.points, scan.bounds)
     spacing = _spacing(grid, pick)
     extent = spacing / 0.47 * np.sqrt(len(scan.points))
@@ -105,7 +104,7 @@ def _constructed(grid: Grid, track: Track, settings: Settings, scan: Scan, pick:
             closed, stop = True, (CLOSED, CLOSED)
         why = unknown_height(stations) or fin(stations.height, float(np.median(stations.width)), settings)
         if why:
-            raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
+            raise NoRidgeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}")
     return Ridge(
         **vars(stations),
         section=section,
@@ -165,7 +164,7 @@ def _track(
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
-            f"no ridge at {_text(pick)}: the points around it agree with a flat base (evidence {found}, "
+            f"no ridge at {text_of(pick)}: the points around it agree with a flat base (evidence {found}, "
             f"needed {settings.evidence:g}); pick a point on the ridge, or give direction=, width= and "
             "height= as a start"
         )
@@ -176,10 +175,10 @@ def _track(
     track = finish_ends(full, track, settings)
     why = too_large(track, extent, settings)
     if why:
-        raise _TooLargeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}", first.width)
+        raise _TooLargeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width)
     why = no_ridge(rough, track, pick, settings)
     if why:
-        raise NoRidgeError(f"no ridge at {_text(pick)}: {why}; {_ADVICE}")
+        raise NoRidgeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}")
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )
@@ -258,66 +257,6 @@ def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:
     gap = nearest_distance(grid, pick)
     if gap > max(10 * spacing, 0.05 * extent):
         raise ValueError(
-            f"at: expected a point on or near the scan, got {_text(pick)}, {gap:.4g} from the nearest point; "
-            "pick a point of the scan"
+            f"at: expected a point on or near the scan, got {text_of(pick)}, {gap:.4g} from the nearest "
+            "point; pick a point of the scan"
         )
-
-
-def _settings(settings: Settings | None, max_templates: int | None) -> Settings:
-    """The settings to use, checked."""
-    settings = settings or Settings()
-    if not isinstance(settings, Settings):
-        raise ValueError(
-            f"settings: expected a Settings, got {type(settings).__name__}; write Settings(name=value)"
-        )
-    if max_templates is None:
-        return settings
-    return replace(settings, max_templates=_positive(max_templates, "max_templates", whole=True))
-
-
-def _hints(direction: ArrayLike | None, width: float | None, height: float | None, kind: str) -> Hints:
-    if kind not in KINDS:
-        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
-    along = None
-    if direction is not None:
-        along = _vector(direction, "direction")
-        if not np.linalg.norm(along) > 0:
-            raise ValueError(
-                "direction: expected a vector of some length, got zero; leave it out to have it found"
-            )
-        along = along / np.linalg.norm(along)
-    return Hints(
-        along,
-        None if width is None else _positive(width, "width"),
-        None if height is None else _positive(height, "height"),
-        kind,
-    )
-
-
-def _positive(value: Any, name: str, whole: bool = False) -> Any:
-    number = _number(value)
-    if not (np.isfinite(number) and number > 0) or (whole and number != int(number)):
-        what = "whole number" if whole else "number"
-        raise ValueError(f"{name}: expected a {what} above 0, got {value!r}; leave it out to have it found")
-    return int(number) if whole else number
-
-
-def _number(value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return float("nan")
-
-
-def _vector(value: ArrayLike, name: str) -> Array:
-    try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name}: expected three finite numbers x, y, z, got {value!r}")
-    return vector
-
-
-def _text(point: Array) -> str:
-    return "(" + ", ".join(f"{x:.6g}" for x in point) + ")"
