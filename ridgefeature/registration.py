@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.arguments import as_text, checked_settings, hints_of, positive, vector
+from ridgefeature.asked import hints_of, positive, settings_of, text_of, vector_of
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
@@ -76,9 +76,9 @@ def register(
     is there.
     """
     scan = as_scan(scan)
-    pick = vector(at, "at")
+    pick = vector_of(at, "at")
     hints = hints_of(direction, width, height, kind)
-    settings = checked_settings(settings, max_templates)
+    settings = settings_of(settings, max_templates)
     if roi is not None:
         scan = scan.crop(pick, positive(roi, "roi"))
     grid = build_grid(scan.points, scan.bounds)
@@ -108,7 +108,7 @@ def _constructed(
             closed, stop = True, (CLOSED, CLOSED)
         why = unknown_height(stations) or fin(stations.height, float(np.median(stations.width)), settings)
         if why:
-            raise NoRidgeError(f"no ridge at {as_text(pick)}: {why}; {_ADVICE}")
+            raise NoRidgeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}")
     return Ridge(
         **vars(stations),
         section=section,
@@ -168,7 +168,7 @@ def _track(
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
-            f"no ridge at {as_text(pick)}: the points around it agree with a flat base (evidence {found}, "
+            f"no ridge at {text_of(pick)}: the points around it agree with a flat base (evidence {found}, "
             f"needed {settings.evidence:g}); pick a point on the ridge, or give direction=, width= and "
             "height= as a start"
         )
@@ -179,10 +179,10 @@ def _track(
     track = finish_ends(full, track, settings)
     why = too_large(track, extent, settings)
     if why:
-        raise _TooLargeError(f"no ridge at {as_text(pick)}: {why}; {_ADVICE}", first.width)
+        raise _TooLargeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width)
     why = no_ridge(rough, track, pick, settings)
     if why:
-        raise NoRidgeError(f"no ridge at {as_text(pick)}: {why}; {_ADVICE}")
+        raise NoRidgeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}")
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )
@@ -261,6 +261,6 @@ def _check_pick(grid: Grid, pick: Array, spacing: float, extent: float) -> None:
     gap = nearest_distance(grid, pick)
     if gap > max(10 * spacing, 0.05 * extent):
         raise ValueError(
-            f"at: expected a point on or near the scan, got {as_text(pick)}, "
+            f"at: expected a point on or near the scan, got {text_of(pick)}, "
             f"{gap:.4g} from the nearest point; pick a point of the scan"
         )

@@ -1,4 +1,4 @@
-"""What a caller of `register` says: checked, and as the registration takes it."""
+"""What `register` is asked, checked: errors tell what was expected, what came and what to do."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 KINDS = ("ridge", "groove", "auto")
 
 
-def checked_settings(settings: Settings | None, max_templates: int | None) -> Settings:
+def settings_of(settings: Settings | None, max_templates: int | None) -> Settings:
     """The settings to use, checked."""
     settings = settings or Settings()
     if not isinstance(settings, Settings):
@@ -28,11 +28,12 @@ def checked_settings(settings: Settings | None, max_templates: int | None) -> Se
 
 
 def hints_of(direction: ArrayLike | None, width: float | None, height: float | None, kind: str) -> Hints:
+    """The hints, checked; the direction as a unit vector."""
     if kind not in KINDS:
         raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
     along = None
     if direction is not None:
-        along = vector(direction, "direction")
+        along = vector_of(direction, "direction")
         if not np.linalg.norm(along) > 0:
             raise ValueError(
                 "direction: expected a vector of some length, got zero; leave it out to have it found"
@@ -47,6 +48,7 @@ def hints_of(direction: ArrayLike | None, width: float | None, height: float | N
 
 
 def positive(value: Any, name: str, whole: bool = False) -> Any:
+    """A number above 0, as a float; whole: as an int."""
     number = _number(value)
     if not (np.isfinite(number) and number > 0) or (whole and number != int(number)):
         what = "whole number" if whole else "number"
@@ -61,7 +63,8 @@ def _number(value: Any) -> float:
         return float("nan")
 
 
-def vector(value: ArrayLike, name: str) -> Array:
+def vector_of(value: ArrayLike, name: str) -> Array:
+    """Three finite numbers (3,)."""
     try:
         vector = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -71,5 +74,6 @@ def vector(value: ArrayLike, name: str) -> Array:
     return vector
 
 
-def as_text(point: Array) -> str:
+def text_of(point: Array) -> str:
+    """A point as messages show it."""
     return "(" + ", ".join(f"{x:.6g}" for x in point) + ")"
