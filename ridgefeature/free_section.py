@@ -125,8 +125,7 @@ def by_likelihood(
         matrix, right = likelihood_section_scores(points, terms, section, *noise, spans, wider)
         sites, nearest = _nearest_spline(spans)
         old = nearest @ section((sites - 0.5) * wider)
-        right += matrix[:, : spans + 3] @ old
-        return matrix, right
+        return matrix, right + matrix[:, : spans + 3] @ old
 
     return told
 
@@ -188,8 +187,7 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> Sect
 
 def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
     """Which knots (spans + 1,) of a spline over `wider` widths lie on the top of a section."""
-    f = section((np.arange(spans + 1) / spans - 0.5) * wider)
-    high = np.flatnonzero(f > _HIGH)
+    high = np.flatnonzero(section((np.arange(spans + 1) / spans - 0.5) * wider) > _HIGH)
     top = np.zeros(spans + 1, dtype=np.bool_)
     top[high[0] + 1 : high[-1]] = True
     return top
@@ -215,9 +213,8 @@ def _smoothest(
     lam = np.full(len(parts), 1e-3 * size)
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        inverse = np.asarray(
-            np.linalg.inv(matrix + np.tensordot(lam, penalties, 1) + ridge), dtype=np.float64
-        )
+        whole = matrix + np.tensordot(lam, penalties, 1) + ridge
+        inverse = np.asarray(np.linalg.inv(whole), dtype=np.float64)
         found = inverse @ right
         rough = np.array([((part @ found) ** 2).sum() for part in parts])
         tied = lam * (penalties * inverse).sum(axis=(1, 2))
