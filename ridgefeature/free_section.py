@@ -29,9 +29,10 @@ LEARNED = "learned"
 _LOW = (0.04, 0.1, 0.25)
 """Heights whose places tell where the feet are."""
 _ROOTS = np.array(_LOW) ** (1.0 / np.linspace(2.0, 3.0, 21)[:, None])
-_FOOT_STD, _FOOT_BLUR = 0.037, 2.0
-"""Of the width between feet, in widths: whether they are parabolas or cubics is not seen; and in deviations of
-the noise that smears it."""
+_FOOT_STD = 0.037
+"""Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
+_FOOT_BLUR = 2.0
+"""Of the same, in deviations of the noise that smears it."""
 _HALF_BLUR = 0.2
 """What that adds to the width at half height: how noise and points lie there is not known well."""
 _TOP = 0.95
@@ -41,7 +42,7 @@ _LEAST_SPANS = 20
 _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 """Of three coefficients, in the height at the middle one's knot."""
 _HIGH = 0.9
-"""Height of the top."""
+"""Height above which a section's knots are on its top."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -124,8 +125,7 @@ def by_likelihood(
         matrix, right = likelihood_section_scores(points, terms, section, *noise, spans, wider)
         sites, nearest = _nearest_spline(spans)
         old = nearest @ section((sites - 0.5) * wider)
-        right += matrix[:, : spans + 3] @ old
-        return matrix, right
+        return matrix, right + matrix[:, : spans + 3] @ old
 
     return told
 
@@ -187,8 +187,7 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> Sect
 
 def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
     """Which knots (spans + 1,) of a spline over `wider` widths lie on the top of a section."""
-    f = section((np.arange(spans + 1) / spans - 0.5) * wider)
-    high = np.flatnonzero(f > _HIGH)
+    high = np.flatnonzero(section((np.arange(spans + 1) / spans - 0.5) * wider) > _HIGH)
     top = np.zeros(spans + 1, dtype=np.bool_)
     top[high[0] + 1 : high[-1]] = True
     return top
@@ -214,7 +213,8 @@ def _smoothest(
     lam = np.full(len(parts), 1e-3 * size)
     ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        inverse: Array = np.linalg.inv(matrix + np.tensordot(lam, penalties, 1) + ridge)
+        whole = matrix + np.tensordot(lam, penalties, 1) + ridge
+        inverse = np.asarray(np.linalg.inv(whole), dtype=np.float64)
         found = inverse @ right
         rough = np.array([((part @ found) ** 2).sum() for part in parts])
         tied = lam * (penalties * inverse).sum(axis=(1, 2))

@@ -35,6 +35,8 @@ _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
 _MANY_STRAYS = 0.03
 """Share of strays from which on they may hide how evenly the others lie."""
+_OVER_SURFACE = 0.5
+"""From which on points about steep flanks lie evenly over the surface."""
 _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _BESIDE = 3.0
@@ -181,7 +183,9 @@ def _lying_as_told(task: Task, state: State) -> State:
     noise = state.noise
     if not task.steep and noise.strays < _MANY_STRAYS:
         return state
-    return state.lying(evenness(task.some, state.terms, state.section, noise))
+    even = evenness(task.some, state.terms, state.section, noise)
+    # Strays about steep flanks pass for points of theirs: only which of both it is can be told.
+    return state.lying(float(even > _OVER_SURFACE) if task.steep else even)
 
 
 def _reshaped(task: Task, state: State) -> State:
