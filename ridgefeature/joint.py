@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.beyond import continued
 from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
@@ -45,6 +46,8 @@ _ON_TOP = 0.8
 """Height from which on a section is the top."""
 _LEAST_NOISE = 0.02
 """Distance of points, in heights, that a section may always miss by."""
+_GIRTH = 41
+"""Places of a section that tell its length."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -63,7 +66,7 @@ class Joint:
     goal: Array
     """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
     counts: Array
-    """(n - 1,) points of each stretch, strays too."""
+    """(n - 1,) points of each stretch, strays too, by the area on which they lie, in squared widths."""
     misfit: Array
     """(n - 1, 3) points of each stretch between the feet, the sum of their squared distances from the surface
     in noise scales or, if that is more, least noises, none more than 25, and how many lie near its top."""
@@ -125,7 +128,7 @@ def fit_whole(
     more; 0: only how a steep one begins. flat: the base stays as curved across as the path has it. most:
     about as many points are looked at.
     """
-    beside = settings.flank * (_BESIDE if is_steep(path) else 1.0)
+    beside = _beside(path, settings)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
     if len(points) < _FEWEST:
         return None
@@ -146,7 +149,9 @@ def fit_whole(
             shaping, state = new.section is not state.section or new.section is box(), new
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
-    return None if state is None or state.fit is None else _joint(task, points, state, state.fit)
+    if state is None or state.fit is None:
+        return None
+    return _joint(task, points, state, state.fit, 2.0 * beside)
 
 
 def known_in_common(joint: Joint, settings: Settings, flat: bool) -> Joint | None:
@@ -158,7 +163,14 @@ def known_in_common(joint: Joint, settings: Settings, flat: bool) -> Joint | Non
         state = likelier(task, joint.points, state, settings.section in FOUND)
     else:
         state = improved(task, joint.points, state, 0, shared=True)
-    return None if state is None or state.fit is None else _joint(task, joint.points, state, state.fit)
+    if state is None or state.fit is None:
+        return None
+    return _joint(task, joint.points, state, state.fit, 2.0 * _beside(joint.path, settings))
+
+
+def _beside(path: PathFrame, settings: Settings) -> float:
+    """Breadth of the base that is looked at on either side of a ridge, in widths."""
+    return settings.flank * (_BESIDE if is_steep(path) else 1.0)
 
 
 def _some(points: Array) -> Array:
@@ -173,6 +185,8 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
         return State(terms, section, first_noise(task.some, terms, section, h, w), weights)
     if before.path is not path:
+        if task.steep:
+            terms = continued(task.some, path, terms, section, before.noise)
         return State(terms, section, before.noise, before.smooth.weights)
     known = before.smooth.weights, before.inflation, before.smooth.freedom
     return State(before.terms, section, before.noise, *known)
@@ -196,13 +210,23 @@ def _reshaped(task: Task, state: State) -> State:
     return new if chance(task.some, new) > chance(task.some, state) else state
 
 
-def _joint(task: Task, points: Array, state: State, fit: Fit) -> Joint:
-    stretches = len(task.path.at) - 1
-    counts = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches].astype(float)
+def _joint(task: Task, points: Array, state: State, fit: Fit, flats: float) -> Joint:
+    """flats: breadth of the base beside the ridge that was looked at, in widths."""
     terms, noise = state.terms, state.noise
+    stretches = len(task.path.at) - 1
+    count = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches]
+    girth = flats + 1.0 + noise.even * (_girths(state.section, terms) - 1.0)
+    counts = count / (girth * task.path.width[1:] ** 2)
     misfit = _misfit(task.some, terms, state.seen, noise.scale)
     told = fit.smooth, terms, state.section, fit.matrix, fit.goal, counts, misfit
     return Joint(task.path, points, *told, noise, state.inflation, state.seen, fit.exact)
+
+
+def _girths(section: Section, terms: Array) -> Array:
+    """(n - 1,) length of the surface from foot to foot, in widths, of each stretch."""
+    steep = np.abs(terms[:, H] / terms[:, W])
+    slope = section(np.linspace(-0.5, 0.5, _GIRTH), 1)
+    return np.asarray(np.hypot(1.0, 0.5 * (steep[1:] + steep[:-1])[:, None] * slope).mean(axis=1))
 
 
 def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:

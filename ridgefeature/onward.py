@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +35,15 @@ _HIGH = (0.5, 1.5)
 """Their heights, in that at the end."""
 _SHARE = 0.5
 """Number of those beyond the end, in that of those on the ridge, from which on it may go on."""
+_FADED = 0.3
+"""Height before an end, in that of the ridge, below which it has faded there."""
 _FEWEST = 3
 _BESIDE = 0.5
 """Distance from the spine, in widths, up to which such points lie on the ridge."""
 _TIMES = 3
 """How often a ridge is marched on."""
+_UNLIKE = 1.6
+"""Factor between sizes of a template and those known of the ridge from which on it is none of it."""
 _LONGER, _ADDED, _NOISIER = 0.3, 0.4, 1.5
 """Least growth of a ridge that was marched on, and distance from what was known that tells what was added, in
 widths; most squared distance of points there, in that before."""
@@ -133,8 +138,18 @@ def _march(
     known, found, why = [*chain[:-USUAL], *judged], list[Template](), INTERRUPTED
     with suppress(KeyboardInterrupt):
         why = march_one_way(rough, full, known, found, settings)
+    found = list(takewhile(lambda t: _alike(t, chain), found))
     whole = Track((*known, *found), (INTERRUPTED, why))
     return list(place_ends(full, whole, settings).templates[len(known) :]) if found else found, why
+
+
+def _alike(template: Template, chain: list[Template]) -> bool:
+    """Whether a template is not much higher, nor much wider or narrower, than all of the ridge so far."""
+    tallest = max(abs(t.height) for t in chain)
+    widths = [t.width for t in chain]
+    return abs(template.height) < _UNLIKE * tallest and (
+        min(widths) / _UNLIKE < template.width < _UNLIKE * max(widths)
+    )
 
 
 def _along(stations: Stations, section: Section, settings: Settings) -> list[Template]:
@@ -173,11 +188,13 @@ def _goes_on(window: Window, stations: Stations, last: int, section: Section, se
     """Whether points beyond an end lie as high as the ridge there, about as many as on it.
 
     last: the station at the end. Beyond: ahead, or, at a sharp bend, beside the ridge. As high as it was over
-    the width before, for one that has faded is followed by the whole fit.
+    the width before; one that has faded was followed by the whole fit.
     """
     s, w = stations.arc_length, float(stations.width[last])
     near = np.abs(s - s[last]) < _FAR * w
     height = float(np.median(stations.height[near]))
+    if abs(height) < _FADED * abs(float(np.median(stations.height))):
+        return False
     end = _template(stations, float(s[last]), section, settings)
     points = window(end.changed(height=height, length=2.0 * _FAR * w, flank=(_FAR - 0.5) * w))
     r = np.hypot(points[:, 0], points[:, 1])

@@ -114,7 +114,7 @@ def _end_of(
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
     inside = (path.at >= start) & (path.at <= end)
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
-    count = windows(joint.counts, near) / windows(path.width[1:] ** 2, near)
+    count = windows(joint.counts, near)
     dense = count > _DENSE * np.median(count[inside[:-near]])
     found, height, half, above = shown
     half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
