@@ -42,7 +42,7 @@ _HUBER = (residual.HUBER, 1.345)
 _ROUGH = 1e-2
 _AGREE = 0.1
 _SLIDES, _MOST_SLIDES = 0.15, 3
-"""Share of its length by which a fit may leave its start's place along the ridge; how often it is slid back."""
+"""Share of its length by which a fit may leave its start's place along the ridge; how often it is slid."""
 _FEW_OUTLIERS = 0.02
 
 
