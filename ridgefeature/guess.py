@@ -63,19 +63,21 @@ def guess(
     section: Section,
     settings: Settings,
     aimed: bool = True,
+    high: bool = False,
 ) -> Template | None:
     """First template, already improved; None where no straight ridge explains the points about the pick.
 
     For every width on a geometric ladder the best direction and offset are found; these starts are improved,
     the best first and at least two, until one is clear, and the one that explains most is kept: of those that
     neither a smooth surface nor an edge explains as well, if there are any. If none is clear, ridges on steep
-    flanks are tried too. aimed: of ridges side by side the
-    one nearer to the pick counts more. `extent`, about the diameter of the scan, bounds the widths. A hinted
+    flanks are tried too. aimed: of ridges side by side the one nearer to the pick counts more; high: only
+    those on steep flanks are tried. `extent`, about the diameter of the scan, bounds the widths. A hinted
     direction (to 10 degrees) and width leave less to try.
     """
     known = window, pick, extent, settings, aimed
     best: _Best | None = None
-    for tried, start in enumerate(starts_about(window, pick, extent, hints, section)):
+    starts = () if high else starts_about(window, pick, extent, hints, section)
+    for tried, start in enumerate(starts):
         if tried >= _FEWEST_TRIES and _is_clear(best):
             break
         fitted = _fitted(window, _template(start, pick, hints, section, settings), pick, settings)

@@ -132,20 +132,22 @@ def _tried(
     settings: Settings,
     progress: Progress | None,
 ) -> Track:
-    """The track of what lies nearest to the pick; else of what explains most about it; else of what is
-    narrower than that, if that is no ridge for its size: a body that bears ridges explains far more."""
+    """The track of what lies nearest to the pick; else of what explains most about it; else of what rises on
+    steep flanks, which look like ridges themselves; else of what is narrower than what was found, if that is
+    no ridge for its size: a body that bears ridges explains far more."""
     known = rough, full, pick, extent, hints, settings, progress
-    try:
+    with suppress(NoRidgeError):
         return _track(*known, reach=extent)
-    except NoRidgeError:
-        pass
     try:
         return _track(*known, reach=extent, aimed=False)
-    except _TooLargeError as found:
+    except NoRidgeError as found:
         refused = found
-    for n in range(0 if hints.width is not None else _NARROWER):
-        with suppress(NoRidgeError):
-            return _track(*known, reach=refused.width / LADDER ** (n + 1))
+    with suppress(NoRidgeError):
+        return _track(*known, reach=extent, high=True)
+    if isinstance(refused, _TooLargeError) and hints.width is None:
+        for n in range(_NARROWER):
+            with suppress(NoRidgeError):
+                return _track(*known, reach=refused.width / LADDER ** (n + 1))
     raise refused
 
 
@@ -159,12 +161,14 @@ def _track(
     progress: Progress | None,
     reach: float,
     aimed: bool = True,
+    high: bool = False,
 ) -> Track:
     """The whole fit: march, ends placed, templates settled; settled again where another section is better.
 
-    reach: as far as ridges are looked for about the pick, `settings.widest` parts of which are their widths.
+    reach: as far as ridges are looked for about the pick, `settings.widest` parts of which are their widths;
+    aimed, high: as for `guess`.
     """
-    first = guess(rough, pick, reach, hints, first_section(settings), settings, aimed)
+    first = guess(rough, pick, reach, hints, first_section(settings), settings, aimed, high)
     if first is None or first.evidence < settings.evidence:
         found = "none" if first is None else f"{max(first.evidence, 0.0):.1f}"
         raise NoRidgeError(
