@@ -150,3 +150,19 @@ def test_functions_stay_short():
                 if lines > 60:
                     long[f"{module_of(path)}.{node.name}"] = lines
     assert long == {}
+
+
+def test_kernels_that_kernels_call_are_inlined():
+    """Else which of several compiled copies is linked, and so the last bit, depends on what was loaded first:
+    the same scan would give another ridge in the process that compiled the kernels."""
+    kernels: dict[str, tuple[str, set[str]]] = {}
+    for path in FILES:
+        if path.parent.name != "kernels":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.decorator_list:
+                called = {ast.unparse(c.func) for c in ast.walk(node) if isinstance(c, ast.Call)}
+                kernels[node.name] = ast.unparse(node.decorator_list[0]), called - {node.name}
+    called = set().union(*(calls for _, calls in kernels.values()))
+    assert len(kernels) > 100
+    assert {name for name, (how, _) in kernels.items() if "OPTIONS" in how and name in called} == set()

@@ -10,8 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import copy_into, solve_in_place
-from ridgefeature.kernels.appraise import residuals
-from ridgefeature.kernels.residual import OPTIONS
+from ridgefeature.kernels.appraise import residuals_of
+from ridgefeature.kernels.residual import INNER, OPTIONS
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _SPLITS = 15
 _FEWEST = 6
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def robust_loss(design: Floats, z: Floats, scale: float, tuning: float, rounds: int = ROUNDS) -> float:
     """Smallest loss (Tukey's) of a linear model design (n, p) of z (n,) that reweighting finds.
 
@@ -64,7 +64,7 @@ def robust_loss(design: Floats, z: Floats, scale: float, tuning: float, rounds: 
     return best
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def powers(x: Floats, y: Floats, degree: int, spare: int) -> Floats:
     """All x^i y^j with i + j <= degree, and `spare` columns of zeros after them."""
     count = (degree + 1) * (degree + 2) // 2
@@ -104,7 +104,7 @@ def advantage(
     n = len(points)
     x, y, z = points[:, 0] / half_length, points[:, 1] / half_breadth, points[:, 2].copy()
     ridge = powers(x, y, 2, 1)
-    copy_into(ridge[:, 6], (z - residuals(points, height, width, trend, table)) / height)
+    copy_into(ridge[:, 6], (z - residuals_of(points, height, width, trend, table)) / height)
     on_ridge = robust_loss(ridge, z, scale, tuning)
     x, y, z = seen[:, 0] / half_length, seen[:, 1] / half_breadth, seen[:, 2].copy()
     smooth = robust_loss(powers(x, y, 3, 0), z, scale, tuning)

@@ -28,8 +28,8 @@ from ridgefeature.kernels.residual import (
 Floats = NDArray[np.float64]
 
 
-@njit(**OPTIONS)
-def residuals(points: Floats, height: float, width: float, trend: Floats, table: Floats) -> Floats:
+@njit(**INNER)
+def residuals_of(points: Floats, height: float, width: float, trend: Floats, table: Floats) -> Floats:
     """Residuals (n,) of points (n, 3)."""
     bend, rise, widening = trend[0], trend[1], trend[2]
     constant, linear, quadratic, cubic = split(table)
@@ -41,6 +41,12 @@ def residuals(points: Floats, height: float, width: float, trend: Floats, table:
             x, y, z, height, width, bend, rise, widening, constant, linear, quadratic, cubic
         )[0]
     return out
+
+
+@njit(**OPTIONS)
+def residuals(points: Floats, height: float, width: float, trend: Floats, table: Floats) -> Floats:
+    """`residuals_of`, for who is no kernel."""
+    return residuals_of(points, height, width, trend, table)
 
 
 @njit(**OPTIONS)
@@ -90,7 +96,7 @@ def mean_loss(
     tuning: float,
 ) -> tuple[float, float]:
     """Mean robust loss of a template as it stands, and the share of points beyond three scales."""
-    r = residuals(points, height, width, trend, table)
+    r = residuals_of(points, height, width, trend, table)
     return loss_sum(r, scale, loss, tuning) / r.size, share_beyond(r, 3.0 * scale)
 
 
@@ -135,8 +141,8 @@ def _gram(rows: tuple[Floats, ...], weights: Floats) -> Floats:
     return normal
 
 
-@njit(**OPTIONS)
-def prepare(
+@njit(**INNER)
+def prepared(
     points: Floats,
     height: float,
     width: float,
@@ -167,6 +173,22 @@ def prepare(
     start = np.zeros(8)
     start[6], start[7] = height, width
     return scale, transform, pack(points, start, prior, trend, transform, table, scale, loss, tuning)
+
+
+@njit(**OPTIONS)
+def prepare(
+    points: Floats,
+    height: float,
+    width: float,
+    trend: Floats,
+    table: Floats,
+    floor: float,
+    prior: Floats,
+    loss: int,
+    tuning: float,
+) -> tuple[float, Floats, Floats]:
+    """`prepared`, for who is no kernel."""
+    return prepared(points, height, width, trend, table, floor, prior, loss, tuning)
 
 
 @njit(**OPTIONS)
@@ -221,7 +243,7 @@ def add_misfit(
 
     The m bins share the distances up to the width.
     """
-    r = residuals(points, height, width, trend, table)
+    r = residuals_of(points, height, width, trend, table)
     per_bin = bins.shape[1] / width
     for i in range(points.shape[0]):
         k = int(abs(points[i, 1]) * per_bin)

@@ -13,12 +13,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ridgefeature.kernels.residual import OPTIONS
+from ridgefeature.kernels.residual import INNER
 
 Floats = NDArray[np.float64]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def factor(band: Floats) -> tuple[Floats, bool]:
     """The lower band of Cholesky's factor, and whether the matrix is positive definite."""
     n, m = band.shape[0], band.shape[1] - 1
@@ -38,7 +38,7 @@ def factor(band: Floats) -> tuple[Floats, bool]:
     return out, True
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def solve(factored: Floats, right: Floats) -> Floats:
     """Solution (n,) for a right side (n,), by the factor."""
     n, m = factored.shape[0], factored.shape[1] - 1
@@ -54,7 +54,7 @@ def solve(factored: Floats, right: Floats) -> Floats:
     return x
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def inverse_band(factored: Floats) -> Floats:
     """The lower band of the inverse (n, m + 1), by the factor."""
     n, m = factored.shape[0], factored.shape[1] - 1

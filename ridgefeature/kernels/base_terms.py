@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import cholesky_in_place, copy_into, solve_in_place
-from ridgefeature.kernels.residual import OPTIONS, loss_jet, residual_jet, split
+from ridgefeature.kernels.residual import INNER, OPTIONS, loss_jet, residual_jet, split
 
 Floats = NDArray[np.float64]
 _PLACED, _MODES = 5, 4
@@ -26,7 +26,7 @@ _LEAST_FLANK = 0.05
 _SAME_SCALE = 0.03
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _all_rows(
     points: Floats, height: float, width: float, trend: Floats, table: Floats
 ) -> tuple[Floats, Floats]:
@@ -59,7 +59,7 @@ def _all_rows(
     return r, out
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _gram(rows: Floats, weights: Floats) -> Floats:
     """Weighted sums (14, 14) of the products of rows (14, n)."""
     out = np.empty((_ROWS, _ROWS))
@@ -132,7 +132,7 @@ def found_terms(
     return step, information, _effect(gram)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _inside(
     r: Floats, scale: float, loss: int, tuning: float, inside: Floats, psi: Floats
 ) -> tuple[float, float, float]:

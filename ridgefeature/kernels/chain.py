@@ -9,9 +9,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import copy_into, cross, turned, walk
-from ridgefeature.kernels.appraise import residuals
+from ridgefeature.kernels.appraise import residuals_of
 from ridgefeature.kernels.evidence import plane_loss
-from ridgefeature.kernels.residual import OPTIONS, loss_jet
+from ridgefeature.kernels.residual import INNER, OPTIONS, loss_jet
 
 Floats = NDArray[np.float64]
 _OTHER_GROUND = 0.5
@@ -84,7 +84,7 @@ def trends(positions: Floats, frames: Floats, sizes: Floats, half_breadths: Floa
     return out
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _levelled(
     points: Floats, height: float, width: float, trend: Floats, scale: float, loss: int, tuning: float
 ) -> Floats:
@@ -128,8 +128,8 @@ def change_point(
     points outside the feet first: far ahead a small error of its tilt would look like a ridge.
     """
     points = _levelled(points, height, width, trend, scale, loss, tuning)
-    ridge = residuals(points, height, width, trend, table)
-    base = residuals(points, 0.0, width, trend, table)
+    ridge = residuals_of(points, height, width, trend, table)
+    base = residuals_of(points, 0.0, width, trend, table)
     order = np.argsort(points[:, 0].copy(), kind="mergesort")
     total = best = 0.0
     last = -1

@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import solve_in_place
-from ridgefeature.kernels.appraise import loss_sum, residuals, share_beyond
+from ridgefeature.kernels.appraise import loss_sum, residuals_of, share_beyond
 from ridgefeature.kernels.residual import HUBER, INNER, OPTIONS, TUKEY, columns, loss_jet, weight_of
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ def _plane_sums(
     return total, s, s_x, s_y, s_xx, s_xy, s_yy, s_r, s_rx, s_ry
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def plane_loss(
     points: Floats, scale: float, loss: int, tuning: float, iterations: int
 ) -> tuple[float, Floats]:
@@ -78,7 +78,7 @@ def explained(points: Floats, height: float, width: float, trend: Floats, table:
     """
     most = abs(height)
     plane = plane_loss(points, 0.3 * most, HUBER, 1.345, 5)[1]
-    ridge = residuals(points, height, width, trend, table)
+    ridge = residuals_of(points, height, width, trend, table)
     flat = points[:, 2] - plane[0] - plane[1] * points[:, 0] - plane[2] * points[:, 1]
     least = 1e-3 * most * points.shape[0]
     return math.log(
@@ -103,7 +103,7 @@ def assess(
     The scale is the standard deviation that the median absolute residual tells. Evidence is twice the loss
     that the best plane has more than the template, a log likelihood ratio, at a scale of at least `contrast`.
     """
-    r = residuals(points, height, width, trend, table)
+    r = residuals_of(points, height, width, trend, table)
     scale = max(1.4826 * np.median(np.abs(r)), floor)
     unit = max(scale, contrast)
     ridge, plane = loss_sum(r, unit, loss, tuning), plane_loss(points, unit, loss, tuning, 5)[0]

@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.algebra import moved
-from ridgefeature.kernels.appraise import prepare
+from ridgefeature.kernels.appraise import prepared
 from ridgefeature.kernels.objective import FREE
 
 Floats = NDArray[np.float64]
@@ -99,9 +99,9 @@ def fit(
 ) -> tuple[Floats, Floats, float, float, int, int]:
     """Position, rotation, height and width after one optimisation from here, evaluations, NLopt's result.
 
-    points (n, 3) in the template's frame; the rest as `prepare`, `bounds` and `minimise` take it.
+    points (n, 3) in the template's frame; the rest as `prepared`, `bounds` and `minimise` take it.
     """
-    _, transform, problem = prepare(points, height, width, trend, table, floor, prior, loss, tuning)
+    _, transform, problem = prepared(points, height, width, trend, table, floor, prior, loss, tuning)
     low, high = bounds(height, width, transform, limits)
     q, evaluations, result = minimise(c, problem, low, high, tolerance, most, algorithm)
     if result < 0:

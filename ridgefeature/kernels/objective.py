@@ -34,7 +34,7 @@ FREE = 7
 _START, _PRIOR, _TREND, _TRANSFORM, _TABLE = 6, 14, 30, 33, 89
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def pack(
     points: Floats,
     start: Floats,

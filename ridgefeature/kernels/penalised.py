@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.banded import factor, inverse_band, solve
-from ridgefeature.kernels.residual import OPTIONS
+from ridgefeature.kernels.residual import INNER, OPTIONS
 from ridgefeature.kernels.strip import TERMS
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ def assembled(matrix: Floats, goal: Floats, first: Indices, basis: Floats, n: in
     return band, out
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _add_penalty(band: Floats, right: Floats, term: int, order: int, weight: float, wanted: Floats) -> None:
     """Add to normal equations the squares of differences less what is wanted of them, times a weight."""
     n = band.shape[0] // TERMS
@@ -55,7 +55,7 @@ def _add_penalty(band: Floats, right: Floats, term: int, order: int, weight: flo
                 band[i, TERMS * (k - m)] += weight * steps[k] * steps[m]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _steps(order: int) -> Floats:
     """Coefficients of a difference: binomial, of alternating sign."""
     out = np.zeros(order + 1)
@@ -67,7 +67,7 @@ def _steps(order: int) -> Floats:
     return out
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _differences(found: Floats, term: int, order: int, wanted: Floats) -> Floats:
     """Differences (n - order,) of a term's coefficients, less what is wanted of them."""
     steps = _steps(order)
@@ -78,7 +78,7 @@ def _differences(found: Floats, term: int, order: int, wanted: Floats) -> Floats
     return left
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _free(inverse: Floats, term: int, order: int, weight: float) -> float:
     """Differences of a term that the data tell: all of them, less those that the penalty holds."""
     rows = inverse.shape[0] // TERMS - order
@@ -93,7 +93,7 @@ def _free(inverse: Floats, term: int, order: int, weight: float) -> float:
     return float(max(rows - weight * trace, 1e-3))
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _next_weight(
     found: Floats, inverse: Floats, term: int, order: int, weight: float, wanted: Floats, doubted: float
 ) -> float:

@@ -26,8 +26,8 @@ Floats = NDArray[np.float64]
 HUBER, TUKEY, SQUARE, CAUCHY = 0, 1, 2, 3
 
 # Sums may be reordered and divisions go unchecked: loops over points then run in SIMD, three times faster.
-# Inlined by force: else which of several cached copies is linked, and so the last bit, would depend on the
-# order in which kernels were loaded.
+# What other kernels call is inlined by force: else which of several cached copies is linked, and so the last
+# bit, would depend on the order in which kernels were loaded.
 INNER: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "forceinline": True}
 OPTIONS: dict[str, Any] = {"cache": True, "fastmath": True, "error_model": "numpy"}
 

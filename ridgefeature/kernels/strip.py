@@ -26,7 +26,7 @@ _LEAST_STEP = 0.15
 """Distance of neighbouring nodes' planes, in parts of that of the nodes, below which they soon meet."""
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def rectified(
     points: Floats,
     origin: Floats,
