@@ -152,9 +152,9 @@ class SectionStd:
     """Of its place."""
 
 
-def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> SectionStd:
-    """How sure a learned section is; arguments as for `free_section`, and `unseen_std` of its flanks. One
-    that has a name is as sure as these."""
+def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: bool) -> SectionStd:
+    """How sure a learned section is; arguments as for `free_section`, `unseen_std` of its flanks, and whether
+    it is told by the likelihood, noise and all. One that has a name is as sure as its flanks."""
     section = seen.section
     if section.name not in (LEARNED, FREE, box().name):
         return SectionStd(half_height_width=gap, width=gap)
@@ -180,7 +180,7 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float) -> Sect
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     half = std(high - low)
     blur = float(np.median(seen.blur))
-    half = math.hypot(half, _HALF_BLUR * blur, gap)
+    half = math.hypot(half, 0.0 if exact else _HALF_BLUR * blur, gap)
     foot = math.hypot(_FOOT_STD, _FOOT_BLUR * blur)
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 

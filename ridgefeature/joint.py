@@ -85,7 +85,7 @@ class Joint:
         some, noise = _some(self.points), self.noise
         told = told_of(some, self.terms, self.seen, noise, self.exact)
         gap = unseen_std(some, self.terms, self.seen, noise.scale)
-        return section_std(told, self.seen, gap, self.inflation)
+        return section_std(told, self.seen, gap, self.inflation, self.exact)
 
     def without(self, term: int) -> Joint:
         """The same where one term is 0."""
