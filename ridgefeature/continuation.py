@@ -36,8 +36,9 @@ _WORSE_ACROSS = (3.0, 1.5)
 _BEYOND_EVIDENCE = 0.3
 """Least evidence of a template behind a bend or crossing, in parts of that of the one before."""
 USUAL = 5
-_OUTGROWN = 2.5
-"""Width of a template, in parts of the median of the last five, that is another ridge's."""
+_OUTGROWN, OUTGROWN_IF_MISFIT = 2.5, 1.8
+"""Width of a template, in parts of the median of the last five, that is another ridge's; and of one that fits
+much worse than these."""
 _RISEN, _FEW = 1.5, 3
 """Height of a template, in the same part, from which on it is asked whether it is one of a ridge at all; how
 many tell what was usual."""
@@ -99,10 +100,10 @@ def reject(fitted: Template, start: Template, settings: Settings, gap: bool = Fa
     return ""
 
 
-def outgrown(fitted: Template, chain: list[Template]) -> str:
+def outgrown(fitted: Template, chain: list[Template], most: float = _OUTGROWN) -> str:
     """Why a template is no part of a ridge as the last ones show it: another, wider rise under it."""
     usual = statistics.median(t.width for t in chain[-USUAL:])
-    return "no ridge: the width grew" if fitted.width > _OUTGROWN * usual else ""
+    return "no ridge: the width grew" if fitted.width > most * usual else ""
 
 
 def sparse(full: Window, fitted: Template, chain: list[Template], gap: bool = False) -> str:

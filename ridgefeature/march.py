@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ridgefeature.alternatives import distinct
 from ridgefeature.continuation import (
     FLAT,
+    OUTGROWN_IF_MISFIT,
     across,
     append,
     met,
@@ -91,8 +92,9 @@ def _fit_next(
         other = across(rough, chain, settings) or round_corner(rough, chain, settings)
         if other is not None:
             return other
-        hopeless = found[1].scale > _FITS_NOT * abs(found[1].height)
-        return (*found[:2], "no ridge: what follows has another section") if hopeless else found
+        if found[1].scale > _FITS_NOT * abs(found[1].height):
+            return (*found[:2], "no ridge: what follows has another section")
+        return (*found[:2], outgrown(found[1], chain, OUTGROWN_IF_MISFIT))
     if found[2] and not gap and chain[-1].evidence > _WEAK * settings.going_on:
         return round_corner(rough, chain, settings, found[2].startswith(FLAT)) or found
     if not found[2].startswith(FLAT):
