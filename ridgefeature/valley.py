@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 _DEEP = 0.1
 """Depth of a hollow base under the spine, below its feet and in heights, from which on it is in doubt."""
-_WORSE = 1.3
+_WORSE = 2.0
 """Noise on the level base, in that on the hollow one, beyond which this one stays."""
 _FLANK = 0.1
 """Breadth of the flanks, in widths, that are looked at beside a ridge in a valley."""
