@@ -33,8 +33,8 @@ _FOOT_STD = 0.037
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
 _FOOT_BLUR = 2.0
 """Of the same, in deviations of the noise that smears it."""
-_HALF_BLUR = 0.2
-"""What that adds to the width at half height: how noise and points lie there is not known well."""
+_HALF_BLUR = 0.2, 0.1
+"""What that adds to the width at half height: how points lie there is not known well; better by likelihood."""
 _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
@@ -180,7 +180,7 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: 
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     half = std(high - low)
     blur = float(np.median(seen.blur))
-    half = math.hypot(half, 0.0 if exact else _HALF_BLUR * blur, gap)
+    half = math.hypot(half, _HALF_BLUR[exact] * blur, gap)
     foot = math.hypot(_FOOT_STD, _FOOT_BLUR * blur)
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
