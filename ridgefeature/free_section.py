@@ -34,7 +34,7 @@ _FOOT_STD = 0.037
 _FOOT_BLUR = 2.0
 """Of the same, in deviations of the noise that smears it."""
 _HALF_BLUR = 0.2, 0.1
-"""What that adds to the width at half height: how points lie there is not known well; better by likelihood."""
+"""What that adds to the width at half height: how points lie there is hardly known; by likelihood better."""
 _TOP = 0.95
 """The apex is midway between the places of this height."""
 _ROUNDS = 8
