@@ -169,22 +169,30 @@ def _chi_square(degrees: int, chance: float) -> float:
 def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...]:
     """The templates with the terms of their base smoothed along the chain, as much as is most likely.
 
-    They are compared in one frame that goes along the chain without turning about the base's normal.
+    The ground does not turn with the ridge, what its section or a bend add to the terms does: they are
+    smoothed in one frame that does not turn about the base's normal, or in those of the templates, where that
+    is likelier.
     """
     ways = [a.rotation.T @ b.rotation for a, b in pairwise(templates)]
     yaws = np.concatenate([[0.0], np.cumsum([np.arctan2(way[1, 0], way[0, 0]) for way in ways])])
-    own = np.array([turning(yaw) for yaw in yaws])
-    common = np.array([turning(-yaw) for yaw in yaws])
     steps = np.linalg.norm(np.diff([t.position for t in templates], axis=0), axis=1)
     at = np.concatenate([[0.0], np.cumsum(steps)])
     width = float(np.median([t.width for t in templates]))
-    terms = np.einsum("nij,nj->ni", common, found.terms)
-    information = np.ascontiguousarray(np.swapaxes(own, 1, 2) @ found.information @ own)
-    tried = [smoothed(at, terms, information, drift / width**3) for drift in _DRIFTS]
-    smooth, variance, _ = max(tried, key=lambda fit: fit[2])
-    smooth = np.einsum("nij,nj->ni", own, smooth)
-    std = np.sqrt(np.maximum(np.einsum("nij,nj->ni", own**2, variance), 0.0))
+    tried = [_smoothed(at, found, turn, drift / width**3) for turn in (yaws, 0.0 * yaws) for drift in _DRIFTS]
+    smooth, std, _ = max(tried, key=lambda fit: fit[2])
     return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))
+
+
+def _smoothed(at: Array, found: Found, yaws: Array, drift: float) -> tuple[Array, Array, float]:
+    """kernels.base_terms.smoothed in frames that are turned back by `yaws` (n,): terms, their standard
+    deviations, log likelihood."""
+    there = np.array([turning(-yaw) for yaw in yaws])
+    back = np.array([turning(yaw) for yaw in yaws])
+    terms = np.einsum("nij,nj->ni", there, found.terms)
+    information = np.ascontiguousarray(np.swapaxes(back, 1, 2) @ found.information @ back)
+    smooth, variance, likelihood = smoothed(at, terms, information, drift)
+    std = np.sqrt(np.maximum(np.einsum("nij,nj->ni", back**2, variance), 0.0))
+    return np.einsum("nij,nj->ni", back, smooth), std, likelihood
 
 
 def starts_on_base(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ridgefeature.alternatives import distinct
 from ridgefeature.asked import hints_of, positive, settings_of, text_of, vector_of
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
@@ -24,12 +25,14 @@ from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
 from ridgefeature.starts import LADDER, Hints
 from ridgefeature.stations import lay_out
-from ridgefeature.template import Template
+from ridgefeature.template import STEEP, Template
 from ridgefeature.valley import fitted_over_ground
 from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
+_STANDS_OUT = 0.5
+"""What must be left, on a curved base, of how much better steep flanks explain points than other surfaces do."""
 _ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
@@ -179,7 +182,7 @@ def _track(
     first = _canonical(full, march_section(rough, first, settings), pick, hints)
     track = ring_or_not(full, march(rough, full, first, settings, progress), settings)
     track = place_ends(full, track, settings)
-    track = settle_base(full, settle(full, track, settings), settings)
+    track = _on_base(rough, full, settle(full, track, settings), settings)
     track = finish_ends(full, track, settings)
     why = too_large(track, extent, settings)
     if why:
@@ -196,6 +199,16 @@ def _track(
     if section is track.templates[0].section:
         return track
     return resettled(full, track, section, settings)
+
+
+def _on_base(rough: Window, full: Window, track: Track, settings: Settings) -> Track:
+    """The settled track on its curved base, if it has one and steep flanks are not explained away by it."""
+    bent = settle_base(full, track, settings)
+    usual = float(np.median([abs(t.height) / t.width for t in track.templates]))
+    if usual < STEEP or not any(t.base.any() for t in bent.templates):
+        return bent
+    before, now = (sum(distinct(rough, t, settings) for t in x.templates) for x in (track, bent))
+    return bent if now > _STANDS_OUT * before else track
 
 
 def _canonical(window: Window, first: Template, pick: Array, hints: Hints) -> Template:

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
 from reference.flat import ridge_free
+from reference.make import draw
 
 import ridgefeature as rf
 from ridgefeature.kernels.alternatives import advantage, powers, robust_loss
@@ -166,3 +167,13 @@ def test_a_height_that_is_hardly_known_is_no_ridge():
     assert unknown_height(replace(sure, height_std=np.inf * ones)) == "", "fits by M tell none"
     ending = np.where(s < s[-1], sure.width, -0.1)
     assert "width of what was fitted there falls to -0.1" in unknown_height(replace(sure, width=ending))
+
+
+def test_a_base_that_explains_steep_flanks_away_is_not_taken():
+    """On a plane: what steep flanks do to the ground beside them made bases of it that left no ridge."""
+    case = draw(20_003, path="ring")
+    assert case.kinds["section"] == "steep"
+    assert case.kinds["host"] == "plane"
+    ridge = rf.register(case.points, at=case.click)
+    assert ridge.closed
+    assert ridge.length == pytest.approx(case.truth.length, rel=0.01)
