@@ -32,7 +32,7 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 _STANDS_OUT = 0.5
-"""What must be left, on a curved base, of how much better steep flanks explain points than other surfaces do."""
+"""What must be left, on a curved base, of how much better steep flanks explain points than other surfaces."""
 _ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
