@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,11 +22,16 @@ _NARROWEST, _LOWEST = 0.2, 0.02
 
 
 def stations_of(
-    joint: Joint, count: int, settings: Settings, between: tuple[float, float] | None = None
+    joint: Joint,
+    count: int,
+    settings: Settings,
+    between: tuple[float, float] | None = None,
+    known: bool = False,
 ) -> Stations:
     """Evenly spaced stations, `count` of them; of a ring the last is the first again.
 
-    between: arc lengths of the joint's path, if not all of it.
+    between: arc lengths of the joint's path, if not all of it. known: their standard deviations are without
+    those of the section, as if that was known.
     """
     path = joint.path
     closed = path.overlap > 0
@@ -50,7 +57,7 @@ def stations_of(
     width = np.maximum(width, _NARROWEST * np.median(width))
     usual = float(np.median(height))
     height = np.copysign(np.maximum(height * np.sign(usual), _LOWEST * abs(usual)), usual)
-    shape, half = joint.section_std, joint.section.half_height_width
+    half = joint.section.half_height_width
     found = Stations(
         arc_length=even,
         spine=curve(t),
@@ -58,14 +65,29 @@ def stations_of(
         normal=normal,
         height=height,
         width=width,
-        height_std=np.hypot(stds[:, 0], np.abs(height) * shape.height),
-        width_std=np.hypot(stds[:, 1], width * shape.width),
-        half_height_width_std=np.hypot(half * stds[:, 1], width * shape.half_height_width),
-        spine_std=np.hypot(stds[:, 2], width * shape.apex),
+        height_std=stds[:, 0],
+        width_std=stds[:, 1],
+        half_height_width_std=half * stds[:, 1],
+        spine_std=stds[:, 2],
         border=border_of(width, bend, settings),
         curvature=curvature,
     )
+    found = found if known else with_section_std(found, joint)
     return meeting(found) if closed else found
+
+
+def with_section_std(stations: Stations, joint: Joint) -> Stations:
+    """Stations whose standard deviations were without those of the section, with these."""
+    shape = joint.section_std
+    return replace(
+        stations,
+        height_std=np.hypot(stations.height_std, np.abs(stations.height) * shape.height),
+        width_std=np.hypot(stations.width_std, stations.width * shape.width),
+        half_height_width_std=np.hypot(
+            stations.half_height_width_std, stations.width * shape.half_height_width
+        ),
+        spine_std=np.hypot(stations.spine_std, stations.width * shape.apex),
+    )
 
 
 def _places(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:

@@ -12,7 +12,7 @@ from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole, known_in_common
 from ridgefeature.joint_rounds import is_steep
-from ridgefeature.joint_stations import stations_of
+from ridgefeature.joint_stations import stations_of, with_section_std
 from ridgefeature.kernels.strip import A, C, E, H, W
 from ridgefeature.own_beginning import as_ring
 from ridgefeature.path_frame import PathFrame, path_frame
@@ -112,7 +112,7 @@ def _refitted(
     if not stations.curvature.any() and first.bent < _BENT:
         flat = True
         first = first.without(C)
-    laid, intervals = stations_of(first, len(stations.arc_length), settings), None
+    laid, intervals = stations_of(first, len(stations.arc_length), settings, known=True), None
     if not closed and any(open_ends):
         laid, intervals, first = _grown(grid, laid, first, open_ends, settings, flat, pick)
         ring = as_ring(laid)
@@ -120,7 +120,7 @@ def _refitted(
             laid, intervals, closed = ring, None, True
     joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
     if joint is None:
-        return Refit(laid, first, intervals, closed), False
+        return Refit(with_section_std(laid, first), first, intervals, closed), False
     found = Refit(laid, joint, intervals, closed, flat)
     return found if closed else _held(grid, found, open_ends, settings, flat, pick), True
 
@@ -143,7 +143,7 @@ def _held(
         if length >= known[-1] or length < SHORTEST * float(np.median(joint.terms[:, W])):
             break
         count = max(round(length / known[1]) + 1, 13)
-        laid = stations_of(joint, count, settings, (start, end))
+        laid = stations_of(joint, count, settings, (start, end), known=True)
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:
             break
@@ -177,7 +177,7 @@ def _grown(
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:
             break
-        joint, laid = again, stations_of(again, len(laid.arc_length), settings)
+        joint, laid = again, stations_of(again, len(laid.arc_length), settings, known=True)
     return laid, intervals, joint
 
 
@@ -199,7 +199,7 @@ def _upright(
         return stations, path, section
     if not stations.curvature.any() and begun.bent < _BENT:
         begun = begun.without(C)
-    laid = stations_of(begun, len(stations.arc_length), settings)
+    laid = stations_of(begun, len(stations.arc_length), settings, known=True)
     return laid, path_frame(laid, closed), begun.section
 
 
@@ -239,7 +239,7 @@ def _between_ends(
     if (start, end) == (0.0, length):
         return stations, intervals, (0.0, 0.0)
     count = int(np.clip(round((end - start) / length * (len(stations.arc_length) - 1)) + 1, 13, 401))
-    return stations_of(wide, count, settings, (start, end)), intervals, (-start, end - length)
+    return stations_of(wide, count, settings, (start, end), known=True), intervals, (-start, end - length)
 
 
 def _sound(joint: Joint) -> bool:
