@@ -178,19 +178,20 @@ def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...
     steps = np.linalg.norm(np.diff([t.position for t in templates], axis=0), axis=1)
     at = np.concatenate([[0.0], np.cumsum(steps)])
     width = float(np.median([t.width for t in templates]))
-    tried = [_smoothed(at, found, turn, drift / width**3) for turn in (yaws, 0.0 * yaws) for drift in _DRIFTS]
+    tried = [_smoothed(at, found, turn, width) for turn in (yaws, 0.0 * yaws)]
     smooth, std, _ = max(tried, key=lambda fit: fit[2])
     return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))
 
 
-def _smoothed(at: Array, found: Found, yaws: Array, drift: float) -> tuple[Array, Array, float]:
-    """kernels.base_terms.smoothed in frames that are turned back by `yaws` (n,): terms, their standard
-    deviations, log likelihood."""
+def _smoothed(at: Array, found: Found, yaws: Array, width: float) -> tuple[Array, Array, float]:
+    """kernels.base_terms.smoothed in frames that are turned back by `yaws` (n,), with the likeliest drift:
+    terms, their standard deviations, log likelihood."""
     there = np.array([turning(-yaw) for yaw in yaws])
     back = np.array([turning(yaw) for yaw in yaws])
     terms = np.einsum("nij,nj->ni", there, found.terms)
     information = np.ascontiguousarray(np.swapaxes(back, 1, 2) @ found.information @ back)
-    smooth, variance, likelihood = smoothed(at, terms, information, drift)
+    tried = [smoothed(at, terms, information, drift / width**3) for drift in _DRIFTS]
+    smooth, variance, likelihood = max(tried, key=lambda fit: fit[2])
     std = np.sqrt(np.maximum(np.einsum("nij,nj->ni", back**2, variance), 0.0))
     return np.einsum("nij,nj->ni", back, smooth), std, likelihood
 
