@@ -12,13 +12,14 @@ from ridgefeature.beyond import continued
 from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
+from ridgefeature.missed_points import with_missed_points
 from ridgefeature.kernels.strip import TERMS, C, H, W, offsets, places_across
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, told_of
-from ridgefeature.smearing import Smeared
+from ridgefeature.smearing import Smeared, log_likelihood
 from ridgefeature.smoothing import Smooth, basis_at
 from ridgefeature.steep_end import likelier
 from ridgefeature.steep_start import likeliest
@@ -100,6 +101,12 @@ class Joint:
         return replace(self, smooth=smooth, inflation=growth * self.inflation)
 
     @property
+    def chance(self) -> float:
+        """Log likelihood of a point, in the mean."""
+        some = _some(self.points)
+        return log_likelihood(some, self.terms, self.section, *self.noise.all) / len(some)
+
+    @property
     def bent(self) -> float:
         """The largest change of the base's curvature, in its standard deviations."""
         std = self.deviations(C)
@@ -120,13 +127,14 @@ def fit_whole(
     rounds: int = 3,
     flat: bool = False,
     most: int = MOST_POINTS,
+    gentle: bool = False,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
     before: an earlier fit, whose noise and smoothness are taken to begin with; None: there was none, and the
     section may be far off. rounds: at most, of which the last does not change the section any
     more; 0: only how a steep one begins. flat: the base stays as curved across as the path has it. most:
-    about as many points are looked at.
+    about as many points are looked at. gentle: begins as if it was not steep.
     """
     beside = _beside(path, settings)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
@@ -135,6 +143,8 @@ def fit_whole(
     some = _some(points)
     shaping = settings.section in FOUND
     task = task_of(some, path, flat)
+    if gentle:
+        task = replace(task, steep=False)
     state: State | None = _begun(task, section, before)
     if state is not None and task.steep and before is None and shaping:
         state = likeliest(task, state)
@@ -183,10 +193,12 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
     terms[:, H], terms[:, W] = path.height, path.width
     if before is None:
         weights = (_START * np.array([h, h / w, h / w**2, w, h, w])) ** -2.0
-        return State(terms, section, first_noise(task.some, terms, section, h, w), weights)
+        noise = first_noise(task.some, terms, section, h, w)
+        return State(with_missed_points(task.some, terms, section, noise), section, noise, weights)
     if before.path is not path:
         if task.steep:
             terms = continued(task.some, path, terms, section, before.noise)
+        terms = with_missed_points(task.some, terms, section, before.noise)
         return State(terms, section, before.noise, before.smooth.weights)
     known = before.smooth.weights, before.inflation, before.smooth.freedom
     return State(before.terms, section, before.noise, *known)

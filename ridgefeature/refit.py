@@ -32,6 +32,8 @@ _GROWTHS, _MUCH = 20, 0.3
 CORRELATED = 2.5
 """Variance of sums over neighbouring points, by that of independent noise, beyond which a ridge or its ground
 is not of the shape that the model has."""
+_MANY_STRAYS = 0.1
+"""Share of strays from which on a steep ridge may not be of the shape that its fit began with."""
 _CUTS = 2
 """How often an end that its points do not hold is cut."""
 
@@ -105,8 +107,7 @@ def _refitted(
     flat = settings.flat
     if not closed:
         stations = as_wide_as_usual(stations, open_ends)
-    stations, path, section = _upright(grid, stations, section, closed, settings, flat)
-    first = _fit(grid, path, section, settings, None, flat)
+    path, first = _first(grid, stations, section, closed, settings, flat)
     if first is None:
         return Refit(stations, closed=closed), False
     if not stations.curvature.any() and first.bent < _BENT:
@@ -186,21 +187,44 @@ def _place(path: PathFrame, pick: Array | None) -> float | None:
     return None if pick is None else float(path.at[np.argmin(((path.origin - pick) ** 2).sum(axis=1))])
 
 
-def _upright(
+def _first(
     grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
-) -> tuple[Stations, PathFrame, Section]:
-    """Stations, their path and section as a fit begins: high flanks lean where the base of a steep ridge is
-    wrong."""
+) -> tuple[PathFrame, Joint | None]:
+    """The first fit and its path.
+
+    What a steep ridge is taken for to begin with, a box, may be far from what it is: if many points are strays
+    then, it is fitted as one that is not steep, too.
+    """
     path = path_frame(stations, closed)
     if not is_steep(path) or settings.section not in FOUND:
-        return stations, path, section
+        return path, _fit(grid, path, section, settings, None, flat)
+    upright, own = _upright(grid, stations, path, section, closed, settings, flat)
+    first = _fit(grid, upright, own, settings, None, flat)
+    if first is not None and first.noise.strays < _MANY_STRAYS:
+        return upright, first
+    gentle = fit_whole(grid, path, section, settings, None, _FIRST_ROUNDS, flat, SOME_POINTS, gentle=True)
+    if gentle is None or not _sound(gentle) or (first is not None and first.chance > gentle.chance):
+        return upright, first
+    return path, gentle
+
+
+def _upright(
+    grid: Grid,
+    stations: Stations,
+    path: PathFrame,
+    section: Section,
+    closed: bool,
+    settings: Settings,
+    flat: bool,
+) -> tuple[PathFrame, Section]:
+    """Path and section as the fit of a steep ridge begins: high flanks lean where its base is wrong."""
     begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
     if begun is None or not _sound(begun):
-        return stations, path, section
+        return path, section
     if not stations.curvature.any() and begun.bent < _BENT:
         begun = begun.without(C)
     laid = stations_of(begun, len(stations.arc_length), settings, known=True)
-    return laid, path_frame(laid, closed), begun.section
+    return path_frame(laid, closed), begun.section
 
 
 def _fit(
@@ -230,7 +254,7 @@ def _between_ends(
     wide = fit_whole(grid, path, joint.section, fixed, joint, 2, flat, SOME_POINTS)
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None, (0.0, 0.0)
-    start, end = ends_of(wide, 0.0, length, open_ends, settings.look_ahead, _place(path, pick))
+    start, end = ends_of(wide, joint, 0.0, length, open_ends, settings.look_ahead, _place(path, pick))
     if end - start < SHORTEST * float(np.median(stations.width)):
         return stations, None, (0.0, 0.0)
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start

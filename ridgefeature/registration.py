@@ -90,8 +90,7 @@ def register(
     _check_pick(grid, pick, spacing, extent)
     full = Window(grid, spacing)
     rough = full.thinned(_ROUGH_POINTS)
-    track = _tried(rough, full, pick, extent, hints, settings, progress)
-    return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
+    return _tried(rough, full, pick, extent, hints, settings, progress, scan)
 
 
 def _constructed(
@@ -134,23 +133,28 @@ def _tried(
     hints: Hints,
     settings: Settings,
     progress: Progress | None,
-) -> Track:
-    """The track of what lies nearest to the pick; else of what explains most about it; else of what rises on
-    steep flanks, which look like ridges themselves; else of what is narrower than what was found, if that is
-    no ridge for its size: a body that bears ridges explains far more."""
-    known = rough, full, pick, extent, hints, settings, progress
+    scan: Scan,
+) -> Ridge:
+    """The ridge that lies nearest to the pick; else what explains most about it; else what rises on steep
+    flanks, which look like ridges themselves; else what is narrower than what was found, if that is no ridge
+    for its size: a body that bears ridges explains far more."""
+
+    def tried(reach: float, aimed: bool = True, high: bool = False) -> Ridge:
+        track = _track(rough, full, pick, extent, hints, settings, progress, reach, aimed, high)
+        return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
+
     with suppress(NoRidgeError):
-        return _track(*known, reach=extent)
+        return tried(extent)
     try:
-        return _track(*known, reach=extent, aimed=False)
+        return tried(extent, aimed=False)
     except NoRidgeError as found:
         refused = found
     with suppress(NoRidgeError):
-        return _track(*known, reach=extent, high=True)
+        return tried(extent, high=True)
     if isinstance(refused, _TooLargeError) and hints.width is None:
         for n in range(_NARROWER):
             with suppress(NoRidgeError):
-                return _track(*known, reach=refused.width / LADDER ** (n + 1))
+                return tried(refused.width / LADDER ** (n + 1))
     raise refused
 
 

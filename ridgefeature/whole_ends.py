@@ -74,6 +74,7 @@ def evidence(joint: Joint, stretches: int) -> tuple[Array, Array]:
 
 def ends_of(
     joint: Joint,
+    before: Joint,
     start: float,
     end: float,
     open_ends: tuple[bool, bool],
@@ -82,16 +83,18 @@ def ends_of(
 ) -> tuple[float, float]:
     """Arc lengths of the joint's path between which the ridge is, known so far from start to end.
 
-    The joint was fitted further out. open_ends: which of both may move. ahead: widths
+    The joint was fitted further out, the one before not: where a ridge ends abruptly a spline that goes on
+    overshoots, and what is inside fits by the other alone. open_ends: which of both may move. ahead: widths
     without data over which a ridge is followed. kept: a place that is on it, if one is known.
     """
     one = min(NODES_A_WIDTH, len(joint.path.at) - 2)
     shown = (*evidence(joint, one), *evidence(joint, one // 2))
     if open_ends[1]:
-        end = _end_of(joint, shown, start, end, ahead, start if kept is None else kept)
+        end = _end_of(joint, before, shown, start, end, ahead, start if kept is None else kept)
     if open_ends[0]:
         backwards = tuple(values[::-1] for values in shown)
-        start = -_end_of(_backwards(joint), backwards, -end, -start, ahead, -(end if kept is None else kept))
+        told = _backwards(joint), _backwards(before), backwards
+        start = -_end_of(*told, -end, -start, ahead, -(end if kept is None else kept))
     return start, end
 
 
@@ -104,13 +107,19 @@ def _backwards(joint: Joint) -> Joint:
 
 
 def _end_of(
-    joint: Joint, shown: tuple[Array, ...], start: float, end: float, ahead: float, kept: float
+    joint: Joint,
+    before: Joint,
+    shown: tuple[Array, ...],
+    start: float,
+    end: float,
+    ahead: float,
+    kept: float,
 ) -> float:
     """Where a ridge ends whose last end is known to be near `end`.
 
     shown: evidence and height of windows of one width and of a half; kept: a place that is on the ridge.
     """
-    path = joint.path
+    path, known = joint.path, end
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
     inside = (path.at >= start) & (path.at <= end)
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
@@ -123,7 +132,12 @@ def _end_of(
     end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
     high = int(np.searchsorted(path.at, end, "right")) - 1
     k = same_ridge(joint, low, high, int(np.argmin(np.abs(path.at - kept))))
-    return end if k == high else float(path.at[k])
+    cut = end if k == high else float(path.at[k])
+    if cut >= min(known, end):
+        return cut
+    inner, last = before.path.at, len(before.path.at) - 1
+    whole = same_ridge(before, 0, last, int(np.argmin(np.abs(inner - kept)))) == last
+    return min(known, end) if whole else cut
 
 
 def _end(

@@ -1,0 +1,87 @@
+"""Where a whole fit would begin with a base or height that hardly any point of its ridge agrees with.
+
+As far as the noise tells, such points are strays, and would stay so however many they are: beyond an end that
+the march put too early, at one that it put too low.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.kernels.strip import A, B, H, W, places_across
+from ridgefeature.noise import Noise
+from ridgefeature.path_frame import NODES_A_WIDTH
+from ridgefeature.section import Section
+
+Array = NDArray[np.float64]
+
+_ON_TOP = 0.8
+"""Height from which on a section is the top."""
+_BESIDE = (0.55, 0.85)
+"""Distances from the middle, in widths, between which points are of the base."""
+_OFF, _LEAST = 4.0, 0.1
+"""Distance from the surface, in noise scales, beyond which a point is a stray; and in heights, about one
+that is found."""
+_FEWEST, _MOST = 6, 0.5
+"""Points of half a width that tell a height; share of them that agree from which on it stays."""
+_LOWEST, _HIGHEST = 0.1, 1.3
+"""Heights that may be found, in the usual and in the largest."""
+
+
+def with_missed_points(points: Array, terms: Array, section: Section, noise: Noise) -> Array:
+    """The terms (n, 6) with base and height that most points agree with, where few do with the known ones.
+
+    points (m, 3) and terms as in kernels.strip, the base as the path has it; where heights are 0 nothing is
+    known of the ridge, and it may begin.
+    """
+    sizes = np.abs(terms[terms[:, H] != 0, H])
+    usual, largest = float(np.median(sizes)), float(sizes.max())
+    sign = np.sign(np.median(terms[terms[:, H] != 0, H]))
+    eta = places_across(points, terms)
+    off, near = _OFF * noise.scale, max(_OFF * noise.scale, _LEAST * usual)
+    out = terms.copy()
+    flats = [
+        _found(points[on, 0], points[on, 2], np.zeros(len(terms)), off, near)
+        for on in ((side * eta > _BESIDE[0]) & (side * eta < _BESIDE[1]) for side in (1.0, -1.0))
+    ]
+    # Beyond the ends the path leads anywhere.
+    moved = (np.isfinite(flats[0]) | np.isfinite(flats[1])) & (terms[:, H] != 0)
+    if moved.any():
+        left, right = (np.where(np.isfinite(z), z, 0.0) for z in flats)
+        out[moved, A] = 0.5 * (left + right)[moved]
+        out[moved, B] = ((left - right) / (sum(_BESIDE) * terms[:, W]))[moved]
+    f = section(eta)
+    top = f > _ON_TOP
+    s, y, z = points[top].T
+    nodes = np.arange(len(terms))
+    own = (z - np.interp(s, nodes, out[:, A]) - y * np.interp(s, nodes, out[:, B])) / f[top]
+    heights = _found(s, own, terms[:, H], off, near)
+    with np.errstate(invalid="ignore"):
+        found = (sign * heights > _LOWEST * usual) & (sign * heights < _HIGHEST * largest)
+        # What is lower than a march has it may be no ridge at all: the fit is to miss it there, and be cut.
+        found &= np.abs(heights) > np.abs(terms[:, H])
+    out[found, H] = heights[found]
+    return out
+
+
+def _found(place: Array, own: Array, known: Array, off: float, near: float) -> Array:
+    """Heights (n,) at the nodes that most points agree with, where few do with the known ones (n,); else NaN.
+
+    place (m,): of points among the nodes; own (m,): their heights; off, near: how far one that agrees may be
+    from what is known, and from what is found.
+    """
+    at, half = np.arange(len(known)), NODES_A_WIDTH // 4 + 0.5
+    order = np.argsort(place, kind="stable")
+    place, own = place[order], own[order]
+    agrees = np.abs(own - np.interp(place, at, known)) < off
+    first, last = np.searchsorted(place, at - half), np.searchsorted(place, at + half)
+    sums = np.concatenate([[0], np.cumsum(agrees)])
+    count, agree = last - first, sums[last] - sums[first]
+    out = np.full(len(known), np.nan)
+    for k in np.flatnonzero((count >= _FEWEST) & (agree < _MOST * count)):
+        heights = own[first[k] : last[k]]
+        height = float(np.median(heights))
+        if (np.abs(heights - height) < near).sum() > max(agree[k], _MOST * count[k]):
+            out[k] = height
+    return out
