@@ -12,8 +12,8 @@ from ridgefeature.beyond import continued
 from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
-from ridgefeature.missed_points import with_missed_points
 from ridgefeature.kernels.strip import TERMS, C, H, W, offsets, places_across
+from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box

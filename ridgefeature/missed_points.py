@@ -45,12 +45,12 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
         _found(points[on, 0], points[on, 2], np.zeros(len(terms)), off, near)
         for on in ((side * eta > _BESIDE[0]) & (side * eta < _BESIDE[1]) for side in (1.0, -1.0))
     ]
+    left, right = (np.where(np.isfinite(z), z, 0.0) for z in flats)
+    ground = 0.5 * (left + right)
     # Beyond the ends the path leads anywhere.
-    moved = (np.isfinite(flats[0]) | np.isfinite(flats[1])) & (terms[:, H] != 0)
-    if moved.any():
-        left, right = (np.where(np.isfinite(z), z, 0.0) for z in flats)
-        out[moved, A] = 0.5 * (left + right)[moved]
-        out[moved, B] = ((left - right) / (sum(_BESIDE) * terms[:, W]))[moved]
+    known = terms[:, H] != 0
+    out[known, A] = ground[known]
+    out[known, B] = ((left - right) / (sum(_BESIDE) * terms[:, W]))[known]
     f = section(eta)
     top = f > _ON_TOP
     s, y, z = points[top].T
@@ -58,7 +58,8 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
     own = (z - np.interp(s, nodes, out[:, A]) - y * np.interp(s, nodes, out[:, B])) / f[top]
     heights = _found(s, own, terms[:, H], off, near)
     with np.errstate(invalid="ignore"):
-        found = (sign * heights > _LOWEST * usual) & (sign * heights < _HIGHEST * largest)
+        over = sign * (heights - np.where(known, 0.0, ground))
+        found = (over > max(_LOWEST * usual, off)) & (over < _HIGHEST * largest)
         # What is lower than a march has it may be no ridge at all: the fit is to miss it there, and be cut.
         found &= np.abs(heights) > np.abs(terms[:, H])
     out[found, H] = heights[found]

@@ -107,7 +107,7 @@ def _refitted(
     flat = settings.flat
     if not closed:
         stations = as_wide_as_usual(stations, open_ends)
-    path, first = _first(grid, stations, section, closed, settings, flat)
+    first = _first(grid, stations, section, closed, settings, flat)
     if first is None:
         return Refit(stations, closed=closed), False
     if not stations.curvature.any() and first.bent < _BENT:
@@ -189,23 +189,23 @@ def _place(path: PathFrame, pick: Array | None) -> float | None:
 
 def _first(
     grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
-) -> tuple[PathFrame, Joint | None]:
-    """The first fit and its path.
+) -> Joint | None:
+    """The first fit.
 
-    What a steep ridge is taken for to begin with, a box, may be far from what it is: if many points are strays
-    then, it is fitted as one that is not steep, too.
+    What a steep ridge is taken for to begin with, a box, may be far from what it is: if many points are
+    strays then, it is fitted as one that is not steep, too.
     """
     path = path_frame(stations, closed)
     if not is_steep(path) or settings.section not in FOUND:
-        return path, _fit(grid, path, section, settings, None, flat)
+        return _fit(grid, path, section, settings, None, flat)
     upright, own = _upright(grid, stations, path, section, closed, settings, flat)
     first = _fit(grid, upright, own, settings, None, flat)
     if first is not None and first.noise.strays < _MANY_STRAYS:
-        return upright, first
+        return first
     gentle = fit_whole(grid, path, section, settings, None, _FIRST_ROUNDS, flat, SOME_POINTS, gentle=True)
     if gentle is None or not _sound(gentle) or (first is not None and first.chance > gentle.chance):
-        return upright, first
-    return path, gentle
+        return first
+    return gentle
 
 
 def _upright(
