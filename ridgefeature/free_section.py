@@ -123,7 +123,7 @@ def by_likelihood(
 
     def told(spans: int, wider: float) -> tuple[Array, Array]:
         matrix, right = likelihood_section_scores(points, terms, section, *noise, spans, wider)
-        sites, nearest = _nearest_spline(spans)
+        sites, nearest = nearest_spline(spans)
         old = nearest @ section((sites - 0.5) * wider)
         return matrix, right + matrix[:, : spans + 3] @ old
 
@@ -256,7 +256,7 @@ def _humped(
 
 def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: int, wider: float) -> float:
     """By how much the found coefficients are more likely than those nearest to the section before."""
-    sites, nearest = _nearest_spline(spans)
+    sites, nearest = nearest_spline(spans)
     old = nearest @ section((sites - 0.5) * wider)
     before = np.concatenate([old, np.zeros(3)])
     # The base is free either way.
@@ -266,7 +266,7 @@ def _gain(matrix: Array, right: Array, found: Array, section: Section, spans: in
 
 
 @lru_cache(maxsize=8)
-def _nearest_spline(spans: int) -> tuple[Array, Array]:
+def nearest_spline(spans: int) -> tuple[Array, Array]:
     """Sites (m,) from 0 to 1; the map (spans + 3, m) from values there to the nearest spline's poles."""
     sites = np.linspace(0.0, 1.0, 8 * spans + 1)
     basis = basis_matrix(np.arange(-3.0, spans + 4.0), 3, spans * sites)

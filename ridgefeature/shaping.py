@@ -17,8 +17,9 @@ from ridgefeature.free_section import (
     trimmed,
 )
 from ridgefeature.kernels.strip import E, W
+from ridgefeature.named_section import best_named
 from ridgefeature.noise import Noise
-from ridgefeature.section import Section, box
+from ridgefeature.section import SECTIONS, Section, box
 from ridgefeature.smearing import Smeared, smear
 
 Array = NDArray[np.float64]
@@ -34,16 +35,20 @@ def told_of(points: Array, terms: Array, seen: Smeared, noise: Noise, exact: boo
 def shaped(
     points: Array, terms: Array, seen: Smeared, noise: Noise, inflation: float, exact: bool = False
 ) -> tuple[Section, Array]:
-    """The section and terms (n, 6), or a free section and its terms where that is better beyond doubt.
+    """The section and terms (n, 6), or another with a name, or a free one, where that is better beyond doubt.
 
     A box is never kept. points (m, 3) in path coordinates and terms as in kernels.strip; seen: the section as
     such noise smears it; inflation: variance of sums over neighbouring points, by what it would be if their
     noise was independent.
     """
     section, price = seen.section, np.log(len(points))
-    told = told_of(points, terms, seen, noise, exact)
     wider = 1.0 if section.name == FREE else WIDER
-    found = free_section(told, section, len(points), SPANS, inflation * price, wider, exact)
+    equations = told_of(points, terms, seen, noise, exact)(SPANS, wider)
+    if section.name in SECTIONS and not exact:
+        own, named = best_named(*equations, section, SPANS, wider)
+        if own.loss - named.loss > inflation * price:
+            return named.section, named.applied(terms)
+    found = free_section(lambda *_: equations, section, len(points), SPANS, inflation * price, wider, exact)
     if found is None or (section is not box() and found.gain / inflation < price * found.freedom):
         return section, terms
     return found.applied(terms)
