@@ -31,6 +31,8 @@ _STRIP, _FEW, _TOGETHER = 0.1, 3, 3
 """Breadth of strips in widths; fewest points of a part one width long; such parts looked at together."""
 _SURE = 3.0
 """Standard deviations from which on such sums are correlated."""
+_CROSSING = 2.0
+"""What scan lines add to variances, in what strips show of it: lines that cross strips are in several."""
 _BLOCK = 5
 """Nodes over which noise may be correlated."""
 _MEDIAN = 0.89
@@ -144,6 +146,7 @@ def inflation_along(
         return np.ones(len(terms) - 1)
     near = np.ones(min(_TOGETHER, windows))
     found = np.convolve(seen, near, "same") / np.maximum(np.convolve(free, near, "same"), 1.0)
+    found = 1.0 + _CROSSING * (found - 1.0)
     middles = (np.arange(len(terms) - 1) + 0.5) / NODES_A_WIDTH - 0.5
     return np.maximum(np.interp(middles, np.arange(windows), found), 1.0)
 

@@ -23,7 +23,7 @@ from ridgefeature.whole_ends import BEYOND, end_interval, ends_of
 
 Array = NDArray[np.float64]
 
-_BENT = 4.5
+_BENT = 3.2
 """Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
@@ -107,7 +107,7 @@ def _refitted(
     flat = settings.flat
     if not closed:
         stations = as_wide_as_usual(stations, open_ends)
-    first = _first(grid, stations, section, closed, settings, flat)
+    stations, first = _first(grid, stations, section, closed, settings, flat)
     if first is None:
         return Refit(stations, closed=closed), False
     if not stations.curvature.any() and first.bent < _BENT:
@@ -189,42 +189,35 @@ def _place(path: PathFrame, pick: Array | None) -> float | None:
 
 def _first(
     grid: Grid, stations: Stations, section: Section, closed: bool, settings: Settings, flat: bool
-) -> Joint | None:
-    """The first fit.
+) -> tuple[Stations, Joint | None]:
+    """The first fit, and stations of the path that it went along.
 
     What a steep ridge is taken for to begin with, a box, may be far from what it is: if many points are
     strays then, it is fitted as one that is not steep, too.
     """
     path = path_frame(stations, closed)
     if not is_steep(path) or settings.section not in FOUND:
-        return _fit(grid, path, section, settings, None, flat)
-    upright, own = _upright(grid, stations, path, section, closed, settings, flat)
-    first = _fit(grid, upright, own, settings, None, flat)
+        return stations, _fit(grid, path, section, settings, None, flat)
+    upright, own = _upright(grid, stations, path, section, settings, flat)
+    first = _fit(grid, path_frame(upright, closed), own, settings, None, flat)
     if first is not None and first.noise.strays < _MANY_STRAYS:
-        return first
+        return upright, first
     gentle = fit_whole(grid, path, section, settings, None, _FIRST_ROUNDS, flat, SOME_POINTS, gentle=True)
     if gentle is None or not _sound(gentle) or (first is not None and first.chance > gentle.chance):
-        return first
-    return gentle
+        return upright, first
+    return stations, gentle
 
 
 def _upright(
-    grid: Grid,
-    stations: Stations,
-    path: PathFrame,
-    section: Section,
-    closed: bool,
-    settings: Settings,
-    flat: bool,
-) -> tuple[PathFrame, Section]:
-    """Path and section as the fit of a steep ridge begins: high flanks lean where its base is wrong."""
+    grid: Grid, stations: Stations, path: PathFrame, section: Section, settings: Settings, flat: bool
+) -> tuple[Stations, Section]:
+    """Stations and section as the fit of a steep ridge begins: high flanks lean where its base is wrong."""
     begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
     if begun is None or not _sound(begun):
-        return path, section
+        return stations, section
     if not stations.curvature.any() and begun.bent < _BENT:
         begun = begun.without(C)
-    laid = stations_of(begun, len(stations.arc_length), settings, known=True)
-    return path_frame(laid, closed), begun.section
+    return stations_of(begun, len(stations.arc_length), settings, known=True), begun.section
 
 
 def _fit(
