@@ -39,6 +39,8 @@ _MANY_STRAYS = 0.03
 """Share of strays from which on they may hide how evenly the others lie."""
 _OVER_SURFACE = 0.5
 """From which on points about steep flanks lie evenly over the surface."""
+_BENT, _BENT_IN_THE_MEAN = 4.5, 2.5
+"""Change of the base's curvature, in standard deviations, up to which it may be chance."""
 _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _BESIDE = 3.0
@@ -107,10 +109,11 @@ class Joint:
         return log_likelihood(some, self.terms, self.section, *self.noise.all) / len(some)
 
     @property
-    def bent(self) -> float:
-        """The largest change of the base's curvature, in its standard deviations."""
+    def bent(self) -> bool:
+        """Whether the base's curvature changes beyond chance: somewhere, or in the mean."""
         std = self.deviations(C)
-        return float((np.abs(self.terms[:, C]) / np.where(std > 0, std, np.inf)).max())
+        each = self.terms[:, C] / np.where(std > 0, std, np.inf)
+        return bool(np.abs(each).max() > _BENT or abs(each.mean()) > _BENT_IN_THE_MEAN)
 
     def deviations(self, term: int) -> Array:
         """(n,) standard deviations of a term at the nodes."""

@@ -23,8 +23,6 @@ from ridgefeature.whole_ends import BEYOND, end_interval, ends_of
 
 Array = NDArray[np.float64]
 
-_BENT = 3.2
-"""Change of the base's curvature, in standard deviations, below which a base that was flat stays so."""
 _FAR, _GROWN, _MOSTLY = 0.5, 3.0, 0.9
 _FIRST_ROUNDS, _LAST_ROUNDS = 4, 3
 _GROWTHS, _MUCH = 20, 0.3
@@ -110,7 +108,7 @@ def _refitted(
     stations, first = _first(grid, stations, section, closed, settings, flat)
     if first is None:
         return Refit(stations, closed=closed), False
-    if not stations.curvature.any() and first.bent < _BENT:
+    if not stations.curvature.any() and not first.bent:
         flat = True
         first = first.without(C)
     laid, intervals = stations_of(first, len(stations.arc_length), settings, known=True), None
@@ -215,7 +213,7 @@ def _upright(
     begun = fit_whole(grid, path, section, settings, None, 0, flat, SOME_POINTS)
     if begun is None or not _sound(begun):
         return stations, section
-    if not stations.curvature.any() and begun.bent < _BENT:
+    if not stations.curvature.any() and not begun.bent:
         begun = begun.without(C)
     return stations_of(begun, len(stations.arc_length), settings, known=True), begun.section
 
