@@ -42,6 +42,8 @@ GOES_ON = (INTERRUPTED, RAN_BACK, CAME_HOME, "max_templates")
 _WEAK = 5.0
 """Evidence in parts of what is needed to go on, below which a ridge hardly stands out."""
 _ALIKE = math.cos(math.radians(8.0))
+_AT_LIMIT = 0.98
+"""Height of a fit, in the most that it may have, from which on it may be higher."""
 _POOR_START = 0.5
 """Mean loss of a start, in noise scales, above which the other starts are looked at."""
 _HOPELESS = 3.0
@@ -86,6 +88,7 @@ def _fit_next(
     kept. Where the ridge hardly stands out, its end is told from a template as long as may be.
     """
     found = _fit_best(rough, full, chain, append(chain, settings), gap, settings)
+    found = _at_limit(rough, full, chain, found, gap, settings)
     if not found[2] and risen(found[1], chain) and distinct(rough, found[1], settings) < _EDGE:
         return (*found[:2], "no ridge: it runs into an edge")
     if not found[2] and not gap and misfits(found[1], chain):
@@ -104,6 +107,22 @@ def _fit_next(
         if not longer[2]:
             return longer
     return found
+
+
+def _at_limit(
+    rough: Window,
+    full: Window,
+    chain: list[Template],
+    found: tuple[Template, Template, str],
+    gap: bool,
+    settings: Settings,
+) -> tuple[Template, Template, str]:
+    """A fit that was no ridge as high as it may be, tried from there: ends that fade rise in no time."""
+    start, fitted, why = found
+    if not why or abs(fitted.height) < _AT_LIMIT * settings.height_change * abs(start.height):
+        return found
+    again = _fit_best(rough, full, chain, [start.changed(height=fitted.height)], gap, settings)
+    return found if again[2] else again
 
 
 def _without_last(chain: list[Template], settings: Settings) -> list[Template]:
