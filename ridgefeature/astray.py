@@ -29,16 +29,20 @@ def core_of(stations: Stations) -> Stations | None:
     """
     sizes = np.abs([np.log(np.maximum(v / np.median(v), 1e-9)) for v in (stations.height, stations.width)])
     alike = (sizes < np.log(_ALIKE)).all(axis=0)
-    if (sizes < np.log(_ASTRAY)).all() or not alike.any():
+    return None if (sizes < np.log(_ASTRAY)).all() else longest_part(stations, alike)
+
+
+def longest_part(stations: Stations, good: Flags) -> Stations | None:
+    """The longest stretch of good stations (k,), without a width where others follow; None if it is short."""
+    if not good.any():
         return None
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]]))).reshape(-1, 2)
-    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
     s, usual = stations.arc_length, float(np.median(stations.width))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]]))).reshape(-1, 2)
+    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
     low, high = s[first] + usual * (first > 0), s[last - 1] - usual * (last < len(s))
     if high - low < SHORTEST * usual:
         return None
-    kept = (s >= low) & (s <= high)
-    return _part(stations, kept)
+    return _part(stations, (s >= low) & (s <= high))
 
 
 def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Stations:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.astray import SHORTEST, as_wide_as_usual, core_of
+from ridgefeature.astray import SHORTEST, as_wide_as_usual, core_of, longest_part
 from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
 from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole, known_in_common
@@ -65,7 +65,7 @@ def refitted(
     them or not.
     """
     found, sound = _refitted(grid, stations, section, closed, open_ends, settings, pick)
-    core = None if sound or closed else core_of(stations)
+    core = None if sound or closed else core_of(stations) or _sound_part(grid, stations, section, settings)
     if core is not None:
         again, sound = _refitted(grid, core, section, closed, (True, True), settings, None)
         found = again if sound else found
@@ -257,13 +257,26 @@ def _between_ends(
     return stations_of(wide, count, settings, (start, end), known=True), intervals, (-start, end - length)
 
 
+def _sound_part(grid: Grid, stations: Stations, section: Section, settings: Settings) -> Stations | None:
+    """The stations where a fit along all of them is still about the ridge that it began with, if enough."""
+    path = path_frame(stations, False)
+    joint = fit_whole(grid, path, section, settings, None, _FIRST_ROUNDS, settings.flat, SOME_POINTS)
+    if joint is None:
+        return None
+    good = np.interp(stations.arc_length, path.at, _sound_at(joint)) > 0.5
+    return longest_part(stations, good)
+
+
 def _sound(joint: Joint) -> bool:
     """Whether a fit is still about the ridge that it began with."""
+    finite = np.isfinite(joint.terms).all() and np.isfinite(joint.smooth.covariance).all()
+    return bool(finite) and float(_sound_at(joint).mean()) > _MOSTLY
+
+
+def _sound_at(joint: Joint) -> NDArray[np.bool_]:
+    """At which nodes (n,) of its path it is."""
     path, terms = joint.path, joint.terms
-    if not (np.isfinite(terms).all() and np.isfinite(joint.smooth.covariance).all()):
-        return False
     aside = np.abs(terms[:, E]) < _FAR * path.width
     level = np.abs(terms[:, A]) < _FAR * path.width + np.abs(path.height)
     grown = terms[:, H] / np.where(path.height == 0, 1.0, path.height)
-    size = (grown > 1 / _GROWN) & (grown < _GROWN)
-    return float((aside & level & size).mean()) > _MOSTLY
+    return np.asarray(aside & level & (grown > 1 / _GROWN) & (grown < _GROWN))
