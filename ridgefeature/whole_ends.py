@@ -128,7 +128,11 @@ def _end_of(
     found, height, half, above = shown
     half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
     seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
-    k = _end(seen, height, dense, joint.terms[:, H], high, one, near, ahead * one + near)
+    usual = [
+        float(np.median(known))
+        for known in (joint.terms[max(high - one, 0) : high + 1, H], before.terms[-near:, H])
+    ]
+    k = _end(seen, height, dense, usual, high, one, near, ahead * one + near)
     end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
     high = int(np.searchsorted(path.at, end, "right")) - 1
     k = same_ridge(joint, low, high, int(np.argmin(np.abs(path.at - kept))))
@@ -141,17 +145,17 @@ def _end_of(
 
 
 def _end(
-    seen: Flags, height: Array, dense: Flags, known: Array, i: int, one: int, near: int, gap: float
+    seen: Flags, height: Array, dense: Flags, usual: list[float], i: int, one: int, near: int, gap: float
 ) -> int:
     """The node at which a ridge ends that is known up to the i-th: further on while it is seen, or earlier.
 
     seen, height: of windows of `one` stretches from each node on; dense: whether there are data, of windows
-    of `near` stretches; known: heights at the nodes as the whole fit has them. gap: the most stretches
-    without data beyond which it is looked for.
+    of `near` stretches; usual: heights before the end, over its last width and at the end itself, which is
+    low where a ridge fades. gap: the most stretches without data beyond which it is looked for.
     """
-    usual = float(np.median(known[max(i - one, 0) : i + 1]))
     last, empty = i, 0
-    seen = seen & (height * usual > _FALLS * usual**2) & (height * usual < _RISES * usual**2)
+    sizes, heights = np.abs(usual), height * np.sign(usual[0])
+    seen = seen & (heights > _FALLS * sizes.min()) & (heights < _RISES * sizes.max())
     for k in range(i + 1, len(seen)):
         empty = 0 if dense[k] else empty + 1
         whole = bool(dense[k : k + one].all())
@@ -160,7 +164,7 @@ def _end(
         if empty > gap or (whole and not seen[k]) or last - i >= _STEP * one:
             break
     if last > i:
-        return min(last + round(_SEEN * one), len(known) - 1)
+        return last + round(_SEEN * one)
     while i > near and not dense[i - near]:
         i -= 1
     return i

@@ -275,3 +275,16 @@ def test_a_march_ends_where_strays_alone_go_on():
     found: list[Template] = []
     march_one_way(window, window, chain, found, SETTINGS.marching())
     assert found and max(t.position[0] for t in found) < 42.0
+
+
+def test_a_march_climbs_faster_than_one_fit_may():
+    """From a click where the ridge is low, at an end that fades, at low noise."""
+    random = np.random.default_rng(3)
+    n = 40000
+    x, y = random.uniform(-40, 100, n), random.uniform(-30, 30, n)
+    height = 4.0 * np.clip(x / 14.0, 0.0, 1.0) ** 2 * (x < 80)
+    points = np.column_stack([x, y, height * bell()(y / 10.0) + random.normal(0, 0.004, n)])
+    found = rf.register(points, at=(4.0, 0.0, 0.33))
+    assert found.spine[:, 0].min() < 4.0
+    assert found.spine[:, 0].max() == pytest.approx(80.0, abs=2.0)
+    assert np.median(found.height) == pytest.approx(4.0, rel=0.02)
