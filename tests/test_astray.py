@@ -56,5 +56,6 @@ def test_a_ridge_is_fitted_along_what_a_march_did_not_leave_it_on():
     ).stations
     assert found.spine[0, 0] == pytest.approx(0.0, abs=0.2 * WIDTH)
     assert 0.7 * LENGTH < found.spine[-1, 0] < LENGTH + 0.2 * WIDTH
-    assert np.abs(found.spine[:, 1]).max() < 0.1 * WIDTH
+    # But for its very end: from there a march goes on.
+    assert np.abs(found.spine[:-2, 1]).max() < 0.1 * WIDTH
     assert found.height == pytest.approx(HEIGHT, rel=0.1)
