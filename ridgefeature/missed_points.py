@@ -15,6 +15,7 @@ from ridgefeature.path_frame import NODES_A_WIDTH
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _ON_TOP = 0.8
 """Height from which on a section is the top."""
@@ -47,23 +48,37 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
     ]
     left, right = (np.where(np.isfinite(z), z, 0.0) for z in flats)
     ground = 0.5 * (left + right)
-    # Beyond the ends the path leads anywhere.
-    known = terms[:, H] != 0
-    out[known, A] = ground[known]
-    out[known, B] = ((left - right) / (sum(_BESIDE) * terms[:, W]))[known]
     f = section(eta)
     top = f > _ON_TOP
     s, y, z = points[top].T
-    nodes = np.arange(len(terms))
-    own = (z - np.interp(s, nodes, out[:, A]) - y * np.interp(s, nodes, out[:, B])) / f[top]
-    heights = _found(s, own, terms[:, H], off, near)
+    heights, nodes = _found(s, z / f[top], terms[:, H], off, near), np.arange(len(terms))
+    # Beyond the ends the path leads anywhere; where only the ground beside is higher others cross the ridge.
+    known = terms[:, H] != 0
+    moved = known & ((np.isfinite(heights) & (ground != 0)) | (sign * ground < 0))
+    if moved.any():
+        out[moved, A] = ground[moved]
+        out[moved, B] = ((left - right) / (sum(_BESIDE) * terms[:, W]))[moved]
+        base = np.interp(s, nodes, out[:, A]) + y * np.interp(s, nodes, out[:, B])
+        heights = _found(s, (z - base) / f[top], terms[:, H], off, near)
     with np.errstate(invalid="ignore"):
-        over = sign * (heights - np.where(known, 0.0, ground))
+        # An edge stands over the ground on one side only.
+        over = sign * heights - np.where(known, 0.0, np.maximum(sign * left, sign * right))
         found = (over > max(_LOWEST * usual, off)) & (over < _HIGHEST * largest)
         # What is lower than a march has it may be no ridge at all: the fit is to miss it there, and be cut.
         found &= np.abs(heights) > np.abs(terms[:, H])
+    found &= _connected(known | found, known)
     out[found, H] = heights[found]
     return out
+
+
+def _connected(any_height: Flags, known: Flags) -> Flags:
+    """Which nodes (n,) have a height in a row with those that are known."""
+    low, high = np.flatnonzero(known)[[0, -1]]
+    gaps = np.flatnonzero(~any_height)
+    first = gaps[gaps < low].max(initial=-1)
+    last = gaps[gaps > high].min(initial=len(known))
+    at = np.arange(len(known))
+    return (at > first) & (at < last)
 
 
 def _found(place: Array, own: Array, known: Array, off: float, near: float) -> Array:
