@@ -51,7 +51,7 @@ class Settings:
         1.5, "largest factor by which the width may change from template to template"
     )
     march_height_change: float = _setting(
-        2.0, "largest factor by which the height may rise from template to template"
+        2.0, "largest factor by which one fit may raise the height from template to template"
     )
     march_drift: float = _setting(
         0.15, "relative change of the width between templates that is expected; of the height, twice"
