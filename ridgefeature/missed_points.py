@@ -36,9 +36,11 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
     points (m, 3) and terms as in kernels.strip, the base as the path has it; where heights are 0 nothing is
     known of the ridge, and it may begin.
     """
-    sizes = np.abs(terms[terms[:, H] != 0, H])
+    known = terms[:, H] != 0
+    if not known.any():
+        return terms
+    sizes, sign = np.abs(terms[known, H]), np.sign(np.median(terms[known, H]))
     usual, largest = float(np.median(sizes)), float(sizes.max())
-    sign = np.sign(np.median(terms[terms[:, H] != 0, H]))
     eta = places_across(points, terms)
     off, near = _OFF * noise.scale, max(_OFF * noise.scale, _LEAST * usual)
     out = terms.copy()
@@ -53,7 +55,6 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
     s, y, z = points[top].T
     heights, nodes = _found(s, z / f[top], terms[:, H], off, near), np.arange(len(terms))
     # Beyond the ends the path leads anywhere; where only the ground beside is higher others cross the ridge.
-    known = terms[:, H] != 0
     moved = known & ((np.isfinite(heights) & (ground != 0)) | (sign * ground < 0))
     if moved.any():
         out[moved, A] = ground[moved]

@@ -57,6 +57,7 @@ def best_named(
 def _fitted(
     matrix: Array, right: Array, before: Section, section: Section, spans: int, wider: float
 ) -> NamedSection:
+    """A section as fitted: linear least squares at each of some widths, to first order in its place."""
     sites, nearest = nearest_spline(spans)
     widths = _WIDTHS * before.half_height_width / section.half_height_width
     eta = (sites - 0.5) * wider / widths[:, None]

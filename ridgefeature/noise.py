@@ -118,7 +118,10 @@ def _evenness(points: Array, terms: Array, section: Section, noise: float) -> fl
         spread = np.exp(-0.5 * ((places[:, None] - places) * w / noise) ** 2)
         dense = (spread @ dense) / spread.sum(axis=1)
     inner = np.abs(places) < _BESIDE
-    found = np.interp(eta[np.abs(eta) < _BESIDE], places, dense).mean()
+    near = eta[np.abs(eta) < _BESIDE]
+    if not len(near):
+        return 0.0
+    found = np.interp(near, places, dense).mean()
     on_base, on_surface = dense[inner].mean(), (dense[inner] ** 2).mean() / dense[inner].mean()
     return float(np.clip((found - on_base) / max(on_surface - on_base, 1e-12), 0.0, 1.0))
 

@@ -128,10 +128,8 @@ def _end_of(
     found, height, half, above = shown
     half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
     seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
-    usual = [
-        float(np.median(known))
-        for known in (joint.terms[max(high - one, 0) : high + 1, H], before.terms[-near:, H])
-    ]
+    last_width, last_part = joint.terms[max(high - one, 0) : high + 1, H], before.terms[-near:, H]
+    usual = [float(np.median(heights)) for heights in (last_width, last_part)]
     k = _end(seen, height, dense, usual, high, one, near, ahead * one + near)
     end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
     high = int(np.searchsorted(path.at, end, "right")) - 1

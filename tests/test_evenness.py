@@ -40,3 +40,11 @@ def test_strays_do_not_make_points_lie_evenly_over_the_base(over_surface, strays
     assert evenness(points, terms, bell(), noise) == pytest.approx(float(over_surface), abs=0.12)
     if over_surface and strays:  # all of them would seem to lie less evenly over the surface
         assert evenness(points, terms, bell(), replace(noise, scale=1e3)) < 0.88
+
+
+@pytest.mark.filterwarnings("error")
+def test_where_all_points_are_strays_they_lie_over_the_base():
+    terms = np.zeros((51, TERMS))
+    terms[:, H], terms[:, W] = HEIGHT, WIDTH
+    far = np.column_stack([np.linspace(0, 50, 99), np.zeros(99), np.full(99, 9 * HEIGHT)])
+    assert evenness(far, terms, bell(), Noise(NOISE, 0.01, 0.01, 4 * HEIGHT, 0.5, NOISE)) == 0.0

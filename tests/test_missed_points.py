@@ -83,6 +83,12 @@ def test_what_lies_lower_than_a_march_has_it_is_not_taken_for_the_ridge():
     assert (with_missed_points(scan, known, bell(), NOISE)[:, H] == HEIGHT).all()
 
 
+def test_without_any_height_nothing_is_known():
+    flat = terms(np.zeros(NODES))
+    scan = points(np.random.default_rng(6), np.full(NODES, HEIGHT))
+    assert (with_missed_points(scan, flat, bell(), NOISE) == flat).all()
+
+
 @pytest.mark.parametrize("count", [0, 3])
 def test_few_points_change_nothing(count):
     known = terms(np.full(NODES, HEIGHT))
