@@ -88,16 +88,15 @@ def _found(place: Array, own: Array, known: Array, off: float, near: float) -> A
     place (m,): of points among the nodes; own (m,): their heights; off, near: how far one that agrees may be
     from what is known, and from what is found.
     """
-    at, half = np.arange(len(known)), NODES_A_WIDTH // 4 + 0.5
-    order = np.argsort(place, kind="stable")
-    place, own = place[order], own[order]
-    agrees = np.abs(own - np.interp(place, at, known)) < off
-    first, last = np.searchsorted(place, at - half), np.searchsorted(place, at + half)
-    sums = np.concatenate([[0], np.cumsum(agrees)])
-    count, agree = last - first, sums[last] - sums[first]
-    out = np.full(len(known), np.nan)
+    nodes, reach = len(known), NODES_A_WIDTH // 4
+    agrees = np.abs(own - np.interp(place, np.arange(nodes), known)) < off
+    nearest = (place + 0.5).astype(np.int64)
+    told = np.stack([np.bincount(nearest, weights, nodes) for weights in (None, agrees)]).astype(np.float64)
+    sums = np.cumsum(np.pad(told, ((0, 0), (reach + 1, reach))), axis=1)
+    count, agree = sums[:, 2 * reach + 1 :] - sums[:, : -2 * reach - 1]
+    out = np.full(nodes, np.nan)
     for k in np.flatnonzero((count >= _FEWEST) & (agree < _MOST * count)):
-        heights = own[first[k] : last[k]]
+        heights = own[np.abs(nearest - k) <= reach]
         height = float(np.median(heights))
         if (np.abs(heights - height) < near).sum() > max(agree[k], _MOST * count[k]):
             out[k] = height
