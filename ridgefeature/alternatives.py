@@ -19,7 +19,7 @@ def distinct(window: Window, template: Template, settings: Settings) -> float:
     scale = max(template.scale, LEAST_CONTRAST * abs(template.height))
     size = 0.5 * template.length, template.half_breadth, scale, settings.tuning
     views = [points]
-    if template.base.any():
+    if template.curved:
         # On a base that is curved by mistake an edge no longer looks like one.
         views.append(on_base(points, template.base))
     return min(min(advantage(points, seen, *template.shape, *size)) for seen in views)

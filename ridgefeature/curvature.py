@@ -143,8 +143,8 @@ class Ahead:
             both.points.sum(keepdims=True),
         )
         if not self.found.significant(_PART * self.settings.base_chance):
-            return template.changed(base=np.zeros(3)) if template.base.any() else template
-        if template.base.any():
+            return template.changed(base=np.zeros(3)) if template.curved else template
+        if template.curved:
             return template.changed(base=both.mean)
         # The first time a curved base must fit better than a flat one, and show the same ridge.
         bent = improve(window, template.changed(base=both.mean), self.settings)
@@ -201,7 +201,7 @@ def starts_on_base(
 ) -> tuple[Array, Array, Array]:
     """kernels.chain.starts, worked out as if the base was flat, and laid on it where it is curved; and its
     terms in their frames (m, 3)."""
-    if not last.base.any():
+    if not last.curved:
         found = chain.starts(positions, frames, last.length, length)
         return *found, np.zeros((len(found[0]), 3))
     own = last.rotation

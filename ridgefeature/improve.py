@@ -174,7 +174,7 @@ def _standing(template: Template, position: Array, rotation: Array, height: floa
 def sample(template: Template, along: int = 9, across: int = 21) -> Array:
     """Points (along * across, 3) spread evenly over the patch, flanks included, in the frame of the scan."""
     local = residual.sampled(*template.shape, template.length, template.half_breadth, along, across)
-    if template.base.any():
+    if template.curved:
         local = on_base(local, template.base)
     return template.position + local @ template.rotation.T
 

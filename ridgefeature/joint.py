@@ -20,7 +20,7 @@ from ridgefeature.section import Section, box
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, told_of
 from ridgefeature.smearing import Smeared, log_likelihood
-from ridgefeature.smoothing import Smooth, basis_at
+from ridgefeature.smoothing import Smooth
 from ridgefeature.steep_end import likelier
 from ridgefeature.steep_start import likeliest
 from ridgefeature.unseen import unseen_std
@@ -32,7 +32,7 @@ _WITHOUT_SHAPING = 1
 FOUND = ("auto", "learned")
 """Settings of the section that let it be found."""
 MOST_POINTS, SOME_POINTS = 300_000, 20_000
-"""As many are looked at in the last round, and before it."""
+"""As many are looked at in the last round of all, and before it."""
 _START = 0.02
 """Roughness to begin with, in sizes of the terms."""
 _MANY_STRAYS = 0.03
@@ -45,8 +45,6 @@ _FAR_OFF = 25.0
 """Squared distance, in noise scales, beyond which a point may lie anywhere."""
 _BESIDE = 3.0
 """Flats beside a steep ridge, in those of templates: height and lean hang on how the base is bent."""
-_ON_TOP = 0.8
-"""Height from which on a section is the top."""
 _LEAST_NOISE = 0.02
 """Distance of points, in heights, that a section may always miss by."""
 _GIRTH = 41
@@ -117,7 +115,7 @@ class Joint:
 
     def deviations(self, term: int) -> Array:
         """(n,) standard deviations of a term at the nodes."""
-        first, basis = basis_at(self.path.coefficients, self.path.knots)
+        first, basis = self.path.at_nodes
         return self.smooth.deviations(first, basis, term)
 
 
@@ -131,6 +129,7 @@ def fit_whole(
     flat: bool = False,
     most: int = MOST_POINTS,
     gentle: bool = False,
+    brief: bool = False,
 ) -> Joint | None:
     """The ridge along a path fitted as a whole; None where there are too few points.
 
@@ -138,6 +137,7 @@ def fit_whole(
     section may be far off. rounds: at most, of which the last does not change the section any
     more; 0: only how a steep one begins. flat: the base stays as curved across as the path has it. most:
     about as many points are looked at. gentle: begins as if it was not steep.
+    brief: where the section stays as it is no other round follows: `known_in_common` is one.
     """
     beside = _beside(path, settings)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
@@ -154,12 +154,14 @@ def fit_whole(
     for n in range(rounds):
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
-        state = improved(task, points if last else some, state, left)
+        state = improved(task, some, state, left)
         if last or state is None:
             break
         if shaping:
             new = _reshaped(task, state)
             shaping, state = new.section is not state.section or new.section is box(), new
+            if brief and not shaping and not task.steep:
+                break
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
     if state is None or state.fit is None:
@@ -204,7 +206,9 @@ def _begun(task: Task, section: Section, before: Joint | None) -> State:
         terms = with_missed_points(task.some, terms, section, before.noise)
         return State(terms, section, before.noise, before.smooth.weights)
     known = before.smooth.weights, before.inflation, before.smooth.freedom
-    return State(before.terms, section, before.noise, *known)
+    state = State(before.terms, section, before.noise, *known)
+    vars(state)["seen"] = before.seen  # which would else be worked out again
+    return state
 
 
 def _lying_as_told(task: Task, state: State) -> State:
@@ -219,8 +223,11 @@ def _lying_as_told(task: Task, state: State) -> State:
 
 def _reshaped(task: Task, state: State) -> State:
     """With a free section if it is better; on steep flanks only if the exact likelihood says so too."""
-    new = state.given(*shaped(task.some, state.terms, state.seen, state.noise, state.inflation))
-    if new.section is state.section or not task.steep:
+    section, terms = shaped(task.some, state.terms, state.seen, state.noise, state.inflation)
+    if section is state.section:
+        return state
+    new = state.given(section, terms)
+    if not task.steep:
         return new
     return new if chance(task.some, new) > chance(task.some, state) else state
 
@@ -251,7 +258,8 @@ def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:
     place, eta = points[on, 0].astype(np.int64), eta[on]
     off = offsets(points[on], terms, seen.told, scale)[0]
     far = np.minimum((off / max(scale, least_noise(terms))) ** 2, _FAR_OFF)
-    top = (seen.section(eta) > _ON_TOP) & (far < _FAR_OFF)
+    low, high = seen.section.top
+    top = (eta > low) & (eta < high) & (far < _FAR_OFF)
     told = [np.bincount(place, weights, len(terms) - 1) for weights in (None, far, top)]
     return np.column_stack(told).astype(np.float64)
 

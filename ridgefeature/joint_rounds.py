@@ -12,10 +12,10 @@ from ridgefeature.foot_points import distances
 from ridgefeature.foot_points import information as foot_information
 from ridgefeature.kernels.strip import C, W, information, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
-from ridgefeature.path_frame import PathFrame, wanted_differences
+from ridgefeature.path_frame import PathFrame
 from ridgefeature.section import Section
 from ridgefeature.smearing import Smeared, likelihood_scores, log_likelihood, smear
-from ridgefeature.smoothing import Smooth, basis_at, smoothest
+from ridgefeature.smoothing import Smooth, smoothest
 from ridgefeature.template import STEEP
 
 Array = NDArray[np.float64]
@@ -84,20 +84,14 @@ class Task:
 
 def task_of(some: Array, path: PathFrame, flat: bool) -> Task:
     """The task of fitting a ridge along a path to points that lie along it."""
-    height, width = _sizes(path)
-    return Task(some, path, flat, wanted_differences(path), height, width, is_steep(path))
+    height, width = path.sizes
+    return Task(some, path, flat, path.wanted, height, width, is_steep(path))
 
 
 def is_steep(path: PathFrame) -> bool:
     """Whether flanks rise so much that a fit must begin near them."""
-    height, width = _sizes(path)
+    height, width = path.sizes
     return height >= STEEP * width
-
-
-def _sizes(path: PathFrame) -> tuple[float, float]:
-    """The usual height and width."""
-    known, width = np.abs(path.height[path.height != 0]), float(np.median(path.width))
-    return float(np.median(known)) if len(known) else width, width
 
 
 def improved(
@@ -130,16 +124,18 @@ def improved(
         return None
     inflation = state.inflation if state.fit is None else inflation_of(gain * matrix, gain * goal)
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
-    local = _in_common(points, state, noise) if shared else np.ones(len(matrix))
-    known, inflation = gain / np.maximum(inflation, local), max(inflation, float(np.median(local)))
-    matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
+    if shared:
+        local = _in_common(points, state, noise)
+        known, inflation = gain / np.maximum(inflation, local), max(inflation, float(np.median(local)))
+        matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
+    else:
+        matrix, goal = gain / inflation * matrix, gain / inflation * goal
     if task.flat:
         _fix(matrix, goal, C)
-    middle = 0.5 * (path.knots[1:] + path.knots[:-1])
     early = left > 0 or near
     told = state.weights, _ROUNDS if early else _LAST_ROUNDS, not early
-    smooth = smoothest(matrix, goal, middle, path.coefficients, task.wanted, *told)
-    first, basis = basis_at(path.coefficients, path.knots)
+    smooth = smoothest(matrix, goal, path.at_middles, path.coefficients, task.wanted, *told)
+    first, basis = path.at_nodes
     terms = (basis[:, :, None] * smooth.coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
     if not np.isfinite(terms).all():
         return None

@@ -156,10 +156,10 @@ def _refitted(window: Window, probes: tuple[Template, ...], section: Section, se
 
 def _seen_from(template: Template, points: Array, other: Template) -> Array:
     """Points (n, 3) of another template's frame in that of a template; flat as each sees its base."""
-    if other.base.any():
+    if other.curved:
         points = on_base(points, other.base)
     points = (points @ other.rotation.T + (other.position - template.position)) @ template.rotation
-    return flattened(points, template.base) if template.base.any() else points
+    return flattened(points, template.base) if template.curved else points
 
 
 def _collapsed(window: Window, templates: tuple[Template, ...]) -> tuple[Array, Array, Array]:

@@ -61,7 +61,7 @@ def along(arc_length: Array, values: Array, at: Array, derivative: int = 0, clos
     knots, inverse = interpolation(len(arc_length), closed)
     total = arc_length[-1]
     basis = basis_matrix(knots * total, DEGREE, np.clip(at, 0.0, total), derivative)
-    return np.tensordot(basis @ inverse, values, 1)
+    return np.tensordot(basis, np.tensordot(inverse, values, 1), 1)
 
 
 def row_controls(

@@ -17,8 +17,6 @@ from ridgefeature.section import Section
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_ON_TOP = 0.8
-"""Height from which on a section is the top."""
 _BESIDE = (0.55, 0.85)
 """Distances from the middle, in widths, between which points are of the base."""
 _OFF, _LEAST = 4.0, 0.1
@@ -50,17 +48,18 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
     ]
     left, right = (np.where(np.isfinite(z), z, 0.0) for z in flats)
     ground = 0.5 * (left + right)
-    f = section(eta)
-    top = f > _ON_TOP
+    low, high = section.top
+    top = (eta > low) & (eta < high)
     s, y, z = points[top].T
-    heights, nodes = _found(s, z / f[top], terms[:, H], off, near), np.arange(len(terms))
+    f = section(eta[top])
+    heights, nodes = _found(s, z / f, terms[:, H], off, near), np.arange(len(terms))
     # Beyond the ends the path leads anywhere; where only the ground beside is higher others cross the ridge.
     moved = known & ((np.isfinite(heights) & (ground != 0)) | (sign * ground < 0))
     if moved.any():
         out[moved, A] = ground[moved]
         out[moved, B] = ((left - right) / (sum(_BESIDE) * terms[:, W]))[moved]
         base = np.interp(s, nodes, out[:, A]) + y * np.interp(s, nodes, out[:, B])
-        heights = _found(s, (z - base) / f[top], terms[:, H], off, near)
+        heights = _found(s, (z - base) / f, terms[:, H], off, near)
     with np.errstate(invalid="ignore"):
         # An edge stands over the ground on one side only.
         over = sign * heights - np.where(known, 0.0, np.maximum(sign * left, sign * right))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,18 +59,30 @@ def _fitted(
     matrix: Array, right: Array, before: Section, section: Section, spans: int, wider: float
 ) -> NamedSection:
     """A section as fitted: linear least squares at each of some widths, to first order in its place."""
-    sites, nearest = nearest_spline(spans)
-    widths = _WIDTHS * before.half_height_width / section.half_height_width
-    eta = (sites - 0.5) * wider / widths[:, None]
-    n = spans + 3
-    columns = np.zeros((len(widths), len(matrix), _UNKNOWN + 3))
-    columns[:, :n, 0] = section(eta) @ nearest.T
-    columns[:, :n, 1] = -(section(eta, 1) / widths[:, None]) @ nearest.T
-    columns[:, n:, _UNKNOWN:] = np.eye(3)
+    columns = _columns(before, section, spans, wider)
     across = columns.transpose(0, 2, 1)
     normal, pull = across @ matrix @ columns, across @ right
     found = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
     loss = -(found * pull).sum(axis=1)
     k = int(np.argmin(loss))
     found[k, 1] /= found[k, 0]
-    return NamedSection(section, float(loss[k]), float(widths[k]), found[k])
+    return NamedSection(section, float(loss[k]), float(_widths(before, section)[k]), found[k])
+
+
+def _widths(before: Section, section: Section) -> Array:
+    return np.asarray(_WIDTHS * before.half_height_width / section.half_height_width)
+
+
+@lru_cache(maxsize=64)
+def _columns(before: Section, section: Section, spans: int, wider: float) -> Array:
+    """How the splines, and the base, change with height, place and base of a section of each width."""
+    sites, nearest = nearest_spline(spans)
+    widths = _widths(before, section)
+    eta = (sites - 0.5) * wider / widths[:, None]
+    n = spans + 3
+    columns = np.zeros((len(widths), n + 3, _UNKNOWN + 3))
+    columns[:, :n, 0] = section(eta) @ nearest.T
+    columns[:, :n, 1] = -(section(eta, 1) / widths[:, None]) @ nearest.T
+    columns[:, n:, _UNKNOWN:] = np.eye(3)
+    columns.setflags(write=False)
+    return columns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.kernels.path_points import boxes_around, count_along, rectified_along
 from ridgefeature.kernels.strip import TERMS, A, B, C, E
 from ridgefeature.merge import along
+from ridgefeature.smoothing import basis_at
 from ridgefeature.stations import Stations, unit
 
 Array = NDArray[np.float64]
@@ -52,6 +54,28 @@ class PathFrame:
         """How many a spline along the path has."""
         return round(float(self.knots[-1])) + 3
 
+    @cached_property
+    def sizes(self) -> tuple[float, float]:
+        """The usual height, as far as any is known, and width."""
+        known, width = np.abs(self.height[self.height != 0]), float(np.median(self.width))
+        return float(np.median(known)) if len(known) else width, width
+
+    @cached_property
+    def at_nodes(self) -> tuple[NDArray[np.intp], Array]:
+        """First function and values of the splines along the path at its nodes."""
+        return basis_at(self.coefficients, self.knots)
+
+    @cached_property
+    def at_middles(self) -> tuple[NDArray[np.intp], Array]:
+        """The same at the middle between each node and the next."""
+        return basis_at(self.coefficients, 0.5 * (self.knots[1:] + self.knots[:-1]))
+
+    @cached_property
+    def wanted(self) -> Array:
+        """(6, n) what the differences of the coefficients should be for path and base to be smooth as a
+        whole."""
+        return _wanted_differences(self)
+
     def between(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """Origin, left, normal (k, 3) and curvature (k,) at arc lengths, as kernels.strip has them."""
         i = np.clip(np.searchsorted(self.at, s, side="right") - 1, 0, len(self.at) - 2)
@@ -81,26 +105,26 @@ def path_frame(stations: Stations, closed: bool, beyond: tuple[float, float] = (
     even = np.linspace(0.0, widths[-1], nodes)
     at = np.interp(even, widths, fine)
     where = at % length if closed else np.clip(at, 0.0, length)
-    spread = along(s, np.eye(len(s)), where, closed=closed)
+    known = (stations.spine, stations.normal, stations.curvature, stations.height, stations.width)
+    found = along(s, np.column_stack(known), where, closed=closed)
+    spine, normal, (curvature, height, width) = found[:, :3], found[:, 3:6], found[:, 6:].T.copy()
     tangent = unit(along(s, stations.spine, where, derivative=1, closed=closed))
-    normal = spread @ stations.normal
     normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
-    height = spread @ stations.height
-    width = np.maximum(spread @ stations.width, 0.3 * stations.width.min())
-    found = PathFrame(
+    width = np.maximum(width, 0.3 * stations.width.min())
+    path = PathFrame(
         at,
         even / widths[-1] * spans,
-        spread @ stations.spine,
+        spine.copy(),
         tangent,
         np.cross(normal, tangent),
         normal,
-        spread @ stations.curvature,
+        curvature,
         height,
         width,
         2.0 * np.abs(height) + 0.25 * width,
         overlap,
     )
-    return found if closed else _run_on(found, length)
+    return path if closed else _run_on(path, length)
 
 
 def _run_on(path: PathFrame, length: float) -> PathFrame:
@@ -166,8 +190,8 @@ def _corners(path: PathFrame, reach: Array) -> Array:
     return np.asarray(path.origin[:, None] + aside[:, :, None] * left + over[:, :, None] * normal)
 
 
-def wanted_differences(path: PathFrame) -> Array:
-    """(6, n) what the differences of the coefficients should be for path and base to be smooth as a whole."""
+def _wanted_differences(path: PathFrame) -> Array:
+    """As PathFrame.wanted."""
     n, s = path.coefficients, path.at
     out = np.zeros((TERMS, n))
 

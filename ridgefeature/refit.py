@@ -117,7 +117,7 @@ def _refitted(
         ring = as_ring(laid)
         if ring is not None:
             laid, intervals, closed = ring, None, True
-    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat)
+    joint = _fit(grid, path_frame(laid, closed), first.section, settings, first, flat, True)
     if joint is None:
         return Refit(with_section_std(laid, first), first, intervals, closed), False
     found = Refit(laid, joint, intervals, closed, flat)
@@ -219,11 +219,17 @@ def _upright(
 
 
 def _fit(
-    grid: Grid, path: PathFrame, section: Section, settings: Settings, before: Joint | None, flat: bool
+    grid: Grid,
+    path: PathFrame,
+    section: Section,
+    settings: Settings,
+    before: Joint | None,
+    flat: bool,
+    brief: bool = False,
 ) -> Joint | None:
-    """The whole fit along a path, if it is sound."""
+    """The whole fit along a path, if it is sound; brief: as for `fit_whole`."""
     rounds, most = (_FIRST_ROUNDS, SOME_POINTS) if before is None else (_LAST_ROUNDS, MOST_POINTS)
-    joint = fit_whole(grid, path, section, settings, before, rounds, flat, most)
+    joint = fit_whole(grid, path, section, settings, before, rounds, flat, most, brief=brief)
     return joint if joint is not None and _sound(joint) else None
 
 

@@ -209,7 +209,7 @@ def _on_base(rough: Window, full: Window, track: Track, settings: Settings) -> T
     """The settled track on its curved base, if it has one and steep flanks are not explained away by it."""
     bent = settle_base(full, track, settings)
     usual = float(np.median([abs(t.height) / t.width for t in track.templates]))
-    if usual < STEEP or not any(t.base.any() for t in bent.templates):
+    if usual < STEEP or not any(t.curved for t in bent.templates):
         return bent
     before, now = (sum(distinct(rough, t, settings) for t in x.templates) for x in (track, bent))
     return bent if now > _STANDS_OUT * before else track

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 _UNIFORM_CUBIC = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0
 
 
+_ON_TOP = 0.8
+"""Height from which on a section is its top."""
 REACH = 4
 """Raised control points on either side of the apex's, in sections fitted to a shape or to points."""
 
@@ -77,6 +79,13 @@ class Section:
         eta = np.linspace(-0.5, 0.5, 2001)
         above = eta[self(eta) >= 0.5]
         return self._crossing(float(above[0])), self._crossing(float(above[-1]))
+
+    @cached_property
+    def top(self) -> tuple[float, float]:
+        """The places, in widths from the middle between the feet, between which it is higher than 0.8."""
+        eta = np.linspace(-0.5, 0.5, 2001)
+        above = eta[self(eta) > _ON_TOP]
+        return float(above[0]), float(above[-1])
 
     def _crossing(self, eta: float) -> float:
         """Where the height is one half, by Newton's method from eta near by."""

@@ -74,7 +74,7 @@ def settle_base(window: Window, track: Track, settings: Settings) -> Track:
         before = track.templates
         if track.base is not None and track.base.significant(settings.base_chance):
             known = curved(before, track.base)
-        elif any(t.base.any() for t in before):
+        elif any(t.curved for t in before):
             known = tuple(t.changed(base=np.zeros(3), base_std=np.zeros(3)) for t in before)
         else:
             break

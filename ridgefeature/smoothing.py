@@ -58,7 +58,7 @@ def basis_at(n: int, at: Floats) -> tuple[NDArray[np.intp], Floats]:
 def smoothest(
     matrix: Floats,
     goal: Floats,
-    places: Floats,
+    basis: tuple[NDArray[np.intp], Floats],
     n: int,
     wanted: Floats,
     weights: Floats,
@@ -67,13 +67,12 @@ def smoothest(
 ) -> Smooth:
     """The splines that the stretches' normal equations and the penalties ask for together.
 
-    matrix (m, 6, 6), goal (m, 6): of m stretches, in units of the noise; places (m,) in knots; n:
-    coefficients a term. wanted (6, n): what the differences should be, by rows as long as there are
-    differences. weights (6,): of the penalties, to begin with, which become likelier with each round.
-    doubted: whether what the data do not tell from a straight line need not be one.
+    matrix (m, 6, 6), goal (m, 6): of m stretches, in units of the noise; basis: as `basis_at` gives it at
+    their middles; n: coefficients a term. wanted (6, n): what the differences should be, by rows as long as
+    there are differences. weights (6,): of the penalties, to begin with, which become likelier with each
+    round. doubted: whether what the data do not tell from a straight line need not be one.
     """
-    first, basis = basis_at(n, places)
-    band, right = assembled(matrix, goal, first, basis, n)
+    band, right = assembled(matrix, goal, *basis, n)
     found, inverse, lam, freedom = most_likely(
         band, right, np.array(ORDERS), wanted, weights, rounds, float(doubted)
     )

@@ -84,14 +84,14 @@ def unit(vectors: Array) -> Array:
 def _on_path(template: Template, x: float) -> Array:
     """Point of the template's bent spine at x along it."""
     place = np.array([x, 0.5 * template.trend[0] * x * x, 0.0])
-    if template.base.any():
+    if template.curved:
         place = on_base(place[None], template.base)[0]
     return template.position + template.rotation @ place
 
 
 def _normal(template: Template, part: float) -> Array:
     """Normal of the base so many lengths along the template."""
-    if not template.base.any():
+    if not template.curved:
         return template.rotation[:, 2]
     place = np.array([part * template.length, 0.0, 0.0])
     return np.asarray(template.rotation @ standing(place, np.eye(3), template.base)[1][:, 2])

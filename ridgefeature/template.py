@@ -68,6 +68,11 @@ class Template:
         return new
 
     @property
+    def curved(self) -> bool:
+        """Whether its base is known to be."""
+        return any(self.base.tolist())
+
+    @property
     def start(self) -> Array:
         """(3,) middle of the first row."""
         return self.position - 0.5 * self.length * self.rotation[:, 0]

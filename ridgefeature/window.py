@@ -72,7 +72,7 @@ class Window:
         half_y = template.half_breadth
         half_z = 2.0 * abs(template.height) + 0.25 * template.width
         low, high = -0.5 * template.length * before, 0.5 * template.length * after
-        if template.base.any():
+        if template.curved:
             return self._flattened(template, low, high, half_y, half_z)
         return self._inside((template.position, template.rotation, low, high, half_y, half_z))
 

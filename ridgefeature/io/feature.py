@@ -49,7 +49,7 @@ def to_document(ridge: Ridge) -> dict[str, Any]:
 
 
 def _is_curved(ridge: Ridge) -> bool:
-    return bool(ridge.curvature.any() or any(t.base.any() for t in ridge.templates))
+    return bool(ridge.curvature.any() or any(t.curved for t in ridge.templates))
 
 
 def _values(of: Any, named: Iterable[Field[Any]], without: Container[str]) -> dict[str, Any]:

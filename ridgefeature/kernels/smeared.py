@@ -45,6 +45,8 @@ def crowded(slope: float, steepness: float, even: float) -> tuple[float, float, 
 
     even: 0 where they lie evenly over the base, 1 where evenly over the surface.
     """
+    if even == 0.0:
+        return 1.0, 0.0, 0.0
     rise = steepness * slope
     stretch = math.sqrt(1.0 + rise * rise)
     change = even * rise / stretch
@@ -72,6 +74,7 @@ def smeared(
     """
     own = split(table)
     out = np.zeros((blur.size, cells + 1, 6))
+    heights = np.empty(abscissae.size)
     for m in range(blur.size):
         square = 1.0 / (blur[m] * blur[m])
         for i in range(cells + 1):
@@ -83,6 +86,7 @@ def smeared(
                 dense, steeper, _ = crowded(slope, steepness[m], even)
                 dense, steeper = shares[k] * dense, shares[k] * steeper
                 change = steeper * bow
+                heights[k] = f
                 f -= level  # so that no digits are lost where there is little noise
                 d += dense
                 d1 += change
@@ -101,8 +105,7 @@ def smeared(
             low = high = level
             for k in range(abscissae.size):
                 if abs(abscissae[k]) <= near:
-                    f = section_at(eta + blur[m] * abscissae[k], own)[0]
-                    low, high = min(low, f), max(high, f)
+                    low, high = min(low, heights[k]), max(high, heights[k])
             out[m, i, LOW], out[m, i, HIGH] = low, high
     return out
 
