@@ -29,10 +29,10 @@ LEARNED = "learned"
 _LOW = (0.04, 0.1, 0.25)
 """Heights whose places tell where the feet are."""
 _ROOTS = np.array(_LOW) ** (1.0 / np.linspace(2.0, 3.0, 21)[:, None])
-_FOOT_STD = 0.025
+_FOOT_STD = 0.021
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
-_FOOT_BLUR = 1.0
-"""Of the same, in deviations of the noise that smears it. Both by how far learned feet are off."""
+_FOOT_BLUR = 1.0, 0.6
+"""The same in deviations of the noise that smears it; by likelihood less. By how far learned feet are off."""
 _HALF_BLUR = 0.2, 0.1
 """What that adds to the width at half height: how points lie there is hardly known; by likelihood better."""
 _TOP = 0.95
@@ -181,7 +181,7 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: 
     half = std(high - low)
     blur = float(np.median(seen.blur))
     half = math.hypot(half, _HALF_BLUR[exact] * blur, gap)
-    foot = math.hypot(_FOOT_STD, _FOOT_BLUR * blur)
+    foot = math.hypot(_FOOT_STD, _FOOT_BLUR[exact] * blur)
     return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
 
 

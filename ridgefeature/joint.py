@@ -12,7 +12,7 @@ from ridgefeature.beyond import continued
 from ridgefeature.free_section import FREE, SectionStd, section_std
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
-from ridgefeature.kernels.strip import TERMS, C, H, W, offsets, places_across
+from ridgefeature.kernels.strip import TERMS, A, C, E, H, W, offsets, places_across
 from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
@@ -49,6 +49,8 @@ _LEAST_NOISE = 0.02
 """Distance of points, in heights, that a section may always miss by."""
 _GIRTH = 41
 """Places of a section that tell its length."""
+_MOVED = 0.02
+"""Largest change of terms by a round, in heights and widths, up to which it may be the last but one."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -137,7 +139,7 @@ def fit_whole(
     section may be far off. rounds: at most, of which the last does not change the section any
     more; 0: only how a steep one begins. flat: the base stays as curved across as the path has it. most:
     about as many points are looked at. gentle: begins as if it was not steep.
-    brief: where the section stays as it is no other round follows: `known_in_common` is one.
+    brief: where section and terms stay as they are no other round follows: `known_in_common` is one.
     """
     beside = _beside(path, settings)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
@@ -152,6 +154,7 @@ def fit_whole(
     if state is not None and task.steep and before is None and shaping:
         state = likeliest(task, state)
     for n in range(rounds):
+        known = state
         last = n == rounds - 1 or (n >= _WITHOUT_SHAPING and not shaping)
         left = rounds - 1 - n if before is None and not last else 0
         state = improved(task, some, state, left)
@@ -160,7 +163,7 @@ def fit_whole(
         if shaping:
             new = _reshaped(task, state)
             shaping, state = new.section is not state.section or new.section is box(), new
-            if brief and not shaping and not task.steep:
+            if brief and not shaping and _hardly_moved(task, known, state):
                 break
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
@@ -242,6 +245,16 @@ def _joint(task: Task, points: Array, state: State, fit: Fit, flats: float) -> J
     misfit = _misfit(task.some, terms, state.seen, noise.scale)
     told = fit.smooth, terms, state.section, fit.matrix, fit.goal, counts, misfit
     return Joint(task.path, points, *told, noise, state.inflation, state.seen, fit.exact)
+
+
+def _hardly_moved(task: Task, before: State | None, after: State) -> bool:
+    """Whether a round changed the terms by so little that one more would change nothing."""
+    if before is None or task.steep:
+        return False
+    moved = np.abs(after.terms - before.terms).max(axis=0)
+    return bool(
+        max(moved[A], moved[H]) < _MOVED * task.height and max(moved[E], moved[W]) < _MOVED * task.width
+    )
 
 
 def _girths(section: Section, terms: Array) -> Array:
