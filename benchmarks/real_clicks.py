@@ -142,7 +142,8 @@ def found_at(track: Track, click: Array) -> Found:
     level = [x - np.outer(x @ up, up) for x in (even(track.crest, PLACES), even(crest_of(ridge), 4 * PLACES))]
     apart = np.linalg.norm(level[0][:, None] - level[1], axis=2)
     nearest, far = apart.argmin(axis=1), apart.min(axis=1)
-    near = far < track.width
+    # Not beyond its ends, however near these are.
+    near = (far < track.width) & (nearest > 0) & (nearest < 4 * PLACES - 1)
     # Places on the crest are even along it, nearly as arc length is.
     at = nearest / (4 * PLACES - 1) * ridge.length
     named = (ridge.height, ridge.height_std, ridge.half_height_width, ridge.half_height_width_std)

@@ -29,6 +29,9 @@ _AGAIN = 1
 """Widths at an end that may seem to fit again, but as another ridge."""
 _MARGIN = 2
 """Stretches at the very end where a height that is less may be none: they may lie beyond it."""
+_WALL = (0.4, 0.4, 1.1)
+"""Rise over a width from which on it is a wall, in heights and in widths, both; height up to which it is not
+yet on it, in the usual."""
 _EXPECTED, _FEWEST = 3.0, 0.15
 """Points on the top of a stretch that are waited for, and the part of them that must be there."""
 
@@ -45,7 +48,11 @@ def held(joint: Joint, open_ends: tuple[bool, bool], kept: float | None = None) 
     turned = replace(joint, misfit=misfit[::-1], terms=terms[::-1])
     start = _on_top(misfit[::-1, 2], same_ridge(turned, 0, n, n - after)) if open_ends[0] else n
     low, high = usual_ends(at, terms[:, W], open_ends)
-    return float(at[max(n - start, min(low, after))]), float(at[min(end, max(high, before))])
+    end, start = min(end, max(high, before)), min(start, n - min(low, after))
+    sizes = np.abs(terms[:, [H, W]])
+    end = _below_a_wall(sizes, before, end) if open_ends[1] else end
+    start = _below_a_wall(sizes[::-1], n - after, start) if open_ends[0] else start
+    return float(at[n - start]), float(at[end])
 
 
 def same_ridge(joint: Joint, start: int, end: int, kept: int = 0) -> int:
@@ -90,6 +97,22 @@ def _leaves(noise: Array, sizes: Array, start: int, first: int, last: int) -> bo
     grown = max(float(noise[k] * (size.max() - 1.0)) for k, size in enumerate(inside, first))
     lower = [float(size[0]) for k, size in enumerate(inside, first) if k + half + _MARGIN < len(sizes)]
     return grown > _OTHER or min(lower, default=1.0) < _LEAST_PART
+
+
+def _below_a_wall(sizes: Array, first: int, end: int) -> int:
+    """The node up to which a crest that is followed outwards from a node to an end meets no wall.
+
+    sizes (n, 2): height and width. Its points may fit, but a blob or a body is no higher part of the ridge.
+    """
+    height, width = sizes.T
+    for k in range(max(first, NODES_A_WIDTH), end - 1):
+        usual = float(np.median(height[k - NODES_A_WIDTH : k + 1]))
+        ahead = height[k : min(k + NODES_A_WIDTH, end) + 1]
+        if ahead.max() - usual > max(_WALL[0] * usual, _WALL[1] * float(width[k])):
+            return k + int(
+                np.flatnonzero(ahead[: int(ahead.argmax()) + 1] <= _WALL[2] * usual).max(initial=0)
+            )
+    return end
 
 
 def _noise(joint: Joint, start: int, end: int) -> Array:
