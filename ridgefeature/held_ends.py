@@ -29,9 +29,10 @@ _AGAIN = 1
 """Widths at an end that may seem to fit again, but as another ridge."""
 _MARGIN = 2
 """Stretches at the very end where a height that is less may be none: they may lie beyond it."""
-_WALL = (0.4, 0.4, 1.1)
-"""Rise over a width from which on it is a wall, in heights and in widths, both; height up to which it is not
-yet on it, in the usual."""
+_WALL, _ON_WALL, _LEVEL = (0.4, 0.4), 1.1, 0.8
+"""Rise over a width from which on it is a wall, in heights and in widths, both, if it was nowhere so high
+before; height from which on a place is on it, in that just before; least height over the width before, in that at its
+foot."""
 _EXPECTED, _FEWEST = 3.0, 0.15
 """Points on the top of a stretch that are waited for, and the part of them that must be there."""
 
@@ -107,11 +108,13 @@ def _below_a_wall(sizes: Array, first: int, end: int) -> int:
     height, width = sizes.T
     for k in range(max(first, NODES_A_WIDTH), end - 1):
         usual = float(np.median(height[k - NODES_A_WIDTH : k + 1]))
+        if height[k - NODES_A_WIDTH : k + 1].min() < _LEVEL * height[k]:
+            continue  # it rises evenly, as from an end that fades
         ahead = height[k : min(k + NODES_A_WIDTH, end) + 1]
-        if ahead.max() - usual > max(_WALL[0] * usual, _WALL[1] * float(width[k])):
-            return k + int(
-                np.flatnonzero(ahead[: int(ahead.argmax()) + 1] <= _WALL[2] * usual).max(initial=0)
-            )
+        top = int(ahead.argmax())
+        steep = ahead[top] - usual > max(_WALL[0] * usual, _WALL[1] * float(width[k]))
+        if steep and ahead[top] > (1.0 + _WALL[0]) * height[: k + 1].max():
+            return k + int(np.flatnonzero(ahead[: top + 1] <= _ON_WALL * usual).max(initial=0))
     return end
 
 
