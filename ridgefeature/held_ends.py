@@ -31,8 +31,8 @@ _MARGIN = 2
 """Stretches at the very end where a height that is less may be none: they may lie beyond it."""
 _WALL, _ON_WALL, _LEVEL = (0.4, 0.4), 1.1, 0.8
 """Rise over a width from which on it is a wall, in heights and in widths, both, if it was nowhere so high
-before; height from which on a place is on it, in that just before; least height over the width before, in that at its
-foot."""
+before; height from which on a place is on it, in that just before; least height over the width before, in
+that at its foot."""
 _EXPECTED, _FEWEST = 3.0, 0.15
 """Points on the top of a stretch that are waited for, and the part of them that must be there."""
 
