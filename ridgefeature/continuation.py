@@ -33,6 +33,8 @@ _CORNER_RADIUS = 0.5
 _ABOUT_STRAIGHT = (-30.0, 30.0)
 _WORSE_ACROSS = (3.0, 1.5)
 """Most noise of a template beyond a crossing, straight on and in a bend, in the least of the last five."""
+_MISSES = 0.02
+"""Noise in heights that any of them may have: so much a section misses the points by."""
 _BEYOND_EVIDENCE = 0.3
 """Least evidence of a template behind a bend or crossing, in parts of that of the one before."""
 USUAL = 5
@@ -188,7 +190,7 @@ def _best_beyond(
         usual = last.evidence / max(last.points, 1) * fitted.points
         if (
             fitted.evidence > max(_BEYOND_EVIDENCE * usual, settings.evidence)
-            and fitted.scale < worse * least
+            and fitted.scale < max(worse * least, _MISSES * abs(fitted.height))
             and _alike(fitted, last)
             and not reject(fitted, start, settings, gap=True)
             and met(fitted, chain[:-1]) < 0

@@ -21,8 +21,9 @@ from reference import paths
 from reference.flat import SURFACES, ridge_free
 from reference.hosts import Array, Cylinder, Host, Plane, Saddle, Sphere
 from reference.make import HOSTS, PATHS, Case, clicks, draw, kinds_of, write
+from reference.measure import registered
 from reference.paths import Path as RidgePath
-from reference.score import Found, read_answer, score
+from reference.score import Found, from_ridge, read_answer, score
 from reference.sections import FLANK, LEAN, PROFILES, level_crossings
 from reference.truth import Truth
 
@@ -415,3 +416,11 @@ def test_the_campaign_prints_its_figures_and_writes_its_table(
     assert [row["seed"] for row in rows] == ["0", "1"] and {row["path"] for row in rows} == {"straight"}
     wrong = subprocess.run([sys.executable, *words, "nonsense"], capture_output=True, text=True)
     assert wrong.returncode == 2 and "expected campaign, flat, clicks, rings or KIND=VALUE" in wrong.stderr
+
+
+def test_a_sharp_bend_is_followed_where_the_section_misses_by_more_than_the_noise() -> None:
+    """The bend of this case ends within a template; behind it a bell misses the flat top by a little more."""
+    case = draw(1768)
+    ridge, seconds, _ = registered(case)
+    assert ridge is not None
+    assert score(case.truth, from_ridge(ridge, seconds)).failed == ()
