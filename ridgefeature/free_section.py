@@ -31,7 +31,7 @@ _LOW = (0.04, 0.1, 0.25)
 _ROOTS = np.array(_LOW) ** (1.0 / np.linspace(2.0, 3.0, 21)[:, None])
 _FOOT_STD = 0.021
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
-_FOOT_BLUR = 1.0, 0.6
+_FOOT_BLUR = 1.0, 0.3
 """The same in deviations of the noise that smears it; by likelihood less. By how far learned feet are off."""
 _HALF_BLUR = 0.2, 0.1
 """What that adds to the width at half height: how points lie there is hardly known; by likelihood better."""
