@@ -106,14 +106,16 @@ def _below_a_wall(sizes: Array, first: int, end: int) -> int:
     sizes (n, 2): height and width. Its points may fit, but a blob or a body is no higher part of the ridge.
     """
     height, width = sizes.T
-    for k in range(max(first, NODES_A_WIDTH), end - 1):
+    highest = np.maximum.accumulate(height)
+    walls = (1.0 + _WALL[0]) * highest < highest[end]  # where there may be one further on
+    for k in range(max(first, NODES_A_WIDTH), min(int(walls.sum()), end - 1)):
         usual = float(np.median(height[k - NODES_A_WIDTH : k + 1]))
         if height[k - NODES_A_WIDTH : k + 1].min() < _LEVEL * height[k]:
             continue  # it rises evenly, as from an end that fades
         ahead = height[k : min(k + NODES_A_WIDTH, end) + 1]
         top = int(ahead.argmax())
         steep = ahead[top] - usual > max(_WALL[0] * usual, _WALL[1] * float(width[k]))
-        if steep and ahead[top] > (1.0 + _WALL[0]) * height[: k + 1].max():
+        if steep and ahead[top] > (1.0 + _WALL[0]) * highest[k]:
             return k + int(np.flatnonzero(ahead[: top + 1] <= _ON_WALL * usual).max(initial=0))
     return end
 
