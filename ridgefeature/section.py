@@ -68,6 +68,11 @@ class Section:
         return len(self.table) - 2
 
     @cached_property
+    def symmetric(self) -> bool:
+        """Whether both of its flanks are alike to the last bit."""
+        return bool((self.coefficients == self.coefficients[::-1]).all())
+
+    @cached_property
     def half_height_width(self) -> float:
         """Full width at half height as a part of the width between the feet."""
         low, high = self.half_height_places
@@ -147,7 +152,7 @@ def _fitted(shape: Callable[[Array], Array], name: str) -> Section:
     eta = np.linspace(-0.5, 0.5, 201)
     columns = np.stack([uniform_basis(eta, k) for k in range(-REACH, REACH + 1)], axis=1)
     raised = np.asarray(np.linalg.lstsq(columns, shape(eta), rcond=None)[0], dtype=np.float64)
-    return Section(raised, name)
+    return Section(0.5 * (raised + raised[::-1]), name)
 
 
 def uniform_basis(eta: Array, k: int) -> Array:

@@ -75,7 +75,8 @@ def smear(section: Section, terms: Array, noise: float, even: float) -> Smeared:
     steepness = np.abs(h) / w
     reach = 0.5 + _REACH * float(blur.max())
     cells = 2 * int(np.ceil(reach * _CELLS))
-    values = smeared(section.table, blur, steepness, even, *_rule(float(blur.max())), reach, cells)
+    rule = _rule(float(blur.max()))
+    values = smeared(section.table, blur, steepness, even, *rule, reach, cells, section.symmetric)
     return Smeared(section, values, reach, blur, steepness, even)
 
 

@@ -12,7 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from ridgefeature import Section, Template
 from ridgefeature.learn import in_doubt
+from ridgefeature.kernels.smeared import smeared
 from ridgefeature.merge import LEAST_BORDER, section_knots, section_poles, template_surface
+from ridgefeature.section import SECTIONS as NAMED
 from ridgefeature.section import bell, plateau
 
 SECTIONS = [bell(), plateau(), Section([0.2, 1.0, 0.7, 0.1]), Section([-0.1, 2.0, 0.4])]
@@ -178,3 +180,36 @@ def test_a_template_changes_its_own_fields_alone():
     assert t.changed(width=9.0).width == 9.0 and t.width == 8.0
     with pytest.raises(TypeError, match="widht"):
         t.changed(widht=9.0)
+
+
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_sections_with_a_name_are_symmetric_to_the_last_bit(name):
+    section = NAMED[name]()
+    assert section.symmetric
+    lopsided = section.coefficients.copy()
+    lopsided[0] *= 1 + 1e-12
+    assert len(lopsided) == 1 or not Section(lopsided).symmetric
+
+
+@pytest.mark.parametrize("even", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("blur", [0.01, 0.1])
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_half_of_a_smeared_symmetric_section_tells_the_other_half(name, blur, even):
+    section, noise, steep = NAMED[name](), np.full(3, blur), np.linspace(0.1, 1.5, 3)
+    places = np.linspace(-4, 4, 31)
+    shares = np.exp(-0.5 * places**2)
+    rule = places, shares / shares.sum()
+    half, whole = (smeared(section.table, noise, steep, even, *rule, 0.8, 220, x) for x in (True, False))
+    np.testing.assert_allclose(half, whole, atol=1e-9)
+    bare = smeared(section.table, noise, steep, even, *rule, 0.8, 220, True)
+    np.testing.assert_array_equal(bare[:, ::-1, 0], bare[:, :, 0])
+
+
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_the_top_of_a_section_is_what_is_higher_than_four_fifths(name):
+    section = NAMED[name]()
+    low, high = section.top
+    eta = np.linspace(-0.5, 0.5, 999)
+    above = section(eta) > 0.8
+    assert (above == ((eta > low) & (eta < high)))[np.abs(np.abs(eta) - high) > 1e-3].all()
+    assert low == pytest.approx(-high)

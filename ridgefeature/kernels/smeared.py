@@ -63,6 +63,7 @@ def smeared(
     shares: Floats,
     reach: float,
     cells: int,
+    symmetric: bool,
 ) -> Floats:
     """What is seen of a section (m, cells + 1, 6), for m amounts of noise, at even places up to reach.
 
@@ -70,14 +71,15 @@ def smeared(
     aside as noise may well carry points, and the derivative of the mean with the apex height, by which steep
     places are crowded too. table: as in Section; blur (m,): standard deviations of the noise; steepness (m,):
     apex heights in widths; even: as in `crowded`; abscissae, shares (k,): of a quadrature over the standard
-    normal distribution.
+    normal distribution;
+    symmetric: whether the section is, and only half of an even number of cells need be worked out.
     """
     own = split(table)
     out = np.zeros((blur.size, cells + 1, 6))
     heights = np.empty(abscissae.size)
     for m in range(blur.size):
         square = 1.0 / (blur[m] * blur[m])
-        for i in range(cells + 1):
+        for i in range(cells // 2 + 1 if symmetric else cells + 1):
             eta = (2.0 * i / cells - 1.0) * reach
             level = section_at(eta, own)[0]
             d = d1 = n = n1 = v = g = g1 = 0.0
@@ -107,6 +109,9 @@ def smeared(
                 if abs(abscissae[k]) <= near:
                     low, high = min(low, heights[k]), max(high, heights[k])
             out[m, i, LOW], out[m, i, HIGH] = low, high
+            if symmetric:
+                out[m, cells - i] = out[m, i]
+                out[m, cells - i, RATE] = -out[m, i, RATE]
     return out
 
 
