@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from ridgefeature import Section, Template
-from ridgefeature.learn import in_doubt
 from ridgefeature.kernels.smeared import smeared
+from ridgefeature.learn import in_doubt
 from ridgefeature.merge import LEAST_BORDER, section_knots, section_poles, template_surface
 from ridgefeature.section import SECTIONS as NAMED
 from ridgefeature.section import bell, plateau
