@@ -183,9 +183,12 @@ def _best_beyond(
 
     worse: most noise, in the least of the last five.
     """
-    last, least = chain[-1], min(t.scale for t in chain[-USUAL:])
+    last = chain[-1]
     found = [(start, improve(rough, start, settings), "") for start in starts]
     for start, fitted, why in sorted(found, key=lambda best: best[1].scale):
+        # What a section misses the points by grows with the height.
+        scales = (t.scale * max(fitted.height / t.height, 1.0) for t in chain[-USUAL:] if t.height)
+        least = min(scales, default=math.inf)
         # By point: the last one may have been fitted to all points of its window, this one to some.
         usual = last.evidence / max(last.points, 1) * fitted.points
         if (
