@@ -420,7 +420,7 @@ def test_the_campaign_prints_its_figures_and_writes_its_table(
 
 @pytest.mark.parametrize("seed", [1768, 2119])
 def test_a_sharp_bend_is_followed_where_the_section_misses_by_more_than_the_noise(seed: int) -> None:
-    """The bend of these ends within a template; behind it a bell misses the flat top, a higher one by more."""
+    """The bend of these ends within a template; behind it a bell misses the flat top, a higher one more."""
     case = draw(seed)
     ridge, seconds, _ = registered(case)
     assert ridge is not None
