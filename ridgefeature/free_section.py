@@ -33,16 +33,17 @@ _FOOT_STD = 0.021
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
 _FOOT_BLUR = 1.0, 0.3
 """The same in deviations of the noise that smears it; by likelihood less. By how far learned feet are off."""
-_HALF_BLUR = 0.2, 0.1
+_HALF_BLUR = 0.15, 0.1
 """What that adds to the width at half height: how points lie there is hardly known; by likelihood better."""
+_TOP_OFF = 2.2
+"""Error of a section's height learned by likelihood, in standard deviations of its fit."""
 _TOP = 0.95
 """The apex is midway between the places of this height."""
-_ROUNDS = 8
-_LEAST_SPANS = 20
+_ROUNDS, _LEAST_SPANS = 8, 20
 _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 """Of three coefficients, in the height at the middle one's knot."""
 _HIGH = 0.9
-"""Height above which a section's knots are on its top."""
+"""Height above which knots are on the top."""
 _TWO_HUMPS = 0.05
 """Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
 
@@ -159,8 +160,7 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: 
     if section.name not in (LEARNED, FREE, box().name):
         return SectionStd(half_height_width=gap, width=gap)
     spans = section.spans
-    matrix, right = told(spans, 1.0)
-    inverse = _smoothest(matrix, right, spans)[2]
+    inverse = _smoothest(*told(spans, 1.0), spans, _top(section, spans, 1.0) if exact else None)[2]
     covariance = inflation * inverse[:-3, :-3]
     eta = np.linspace(-0.5, 0.5, 2001)
     f = section(eta)
@@ -178,11 +178,11 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: 
         return math.sqrt(max(float(of @ covariance @ of), 0.0))
 
     (low, high), (left, right) = moved(0.5), moved(_TOP)
-    half = std(high - low)
     blur = float(np.median(seen.blur))
-    half = math.hypot(half, _HALF_BLUR[exact] * blur, gap)
+    half = math.hypot(std(high - low), _HALF_BLUR[exact] * blur, gap)
     foot = math.hypot(_FOOT_STD, _FOOT_BLUR[exact] * blur)
-    return SectionStd(std(top), half, math.hypot(half, foot), std(0.5 * (left + right)))
+    height = (_TOP_OFF if exact else 1.0) * std(top)
+    return SectionStd(height, half, math.hypot(half, foot), std(0.5 * (left + right)))
 
 
 def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:

@@ -126,7 +126,8 @@ def _noise(joint: Joint, start: int, end: int) -> Array:
     sums = windows(joint.misfit, half)
     noise = sums[:, 1] / np.maximum(sums[:, 0], 1.0)
     least = (least_noise(joint.terms) / max(least_noise(joint.terms), joint.noise.scale)) ** 2
-    return np.asarray(noise / max(float(np.median(noise[start : max(end - half, start) + 1])), least))
+    usual = float(np.median(noise[start : max(end - half, start) + 1]))
+    return np.asarray(noise / max(usual, least, 1e-300))
 
 
 def windows(values: Array, count: int) -> Array:

@@ -38,6 +38,8 @@ _ROUGH_POINTS = 400
 _NEAR = 100
 _NARROWER = 6
 """Steps of the ladder of widths by which narrower ridges are looked for on what is too large for one."""
+_OTHER_WIDTHS = -1, 1, -2, 2, -3, 3
+"""Steps of it from the width of what was refused, at which a ridge is looked for at last."""
 _CLUSTERED = 1.6
 """What a spacing by density is, in the median distance to the nearest point, where points lie in clusters or
 lines; on an even surface it is 0.5 (grids) to 1.25."""
@@ -47,12 +49,12 @@ class NoRidgeError(ValueError):
     """There is no ridge at the picked point."""
 
 
-class _TooLargeError(NoRidgeError):
-    """What was found there is too large for one; it began with a template of this width."""
+class _RefusedError(NoRidgeError):
+    """What was found there is none, perhaps for its size; it began with a template of this width."""
 
-    def __init__(self, message: str, width: float) -> None:
+    def __init__(self, message: str, width: float, too_large: bool = False) -> None:
         super().__init__(message)
-        self.width = width
+        self.width, self.too_large = width, too_large
 
 
 def register(
@@ -110,7 +112,7 @@ def _constructed(
             closed, stop = True, (CLOSED, CLOSED)
         why = unknown_height(stations) or fin(stations.height, float(np.median(stations.width)), settings)
         if why:
-            raise NoRidgeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}")
+            raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", track.templates[0].width)
     return Ridge(
         **vars(stations),
         section=section,
@@ -137,7 +139,7 @@ def _tried(
 ) -> Ridge:
     """The ridge that lies nearest to the pick; else what explains most about it; else what rises on steep
     flanks, which look like ridges themselves; else what is narrower than what was found, if that is no ridge
-    for its size: a body that bears ridges explains far more."""
+    for its size: a body that bears ridges explains far more; else what begins with some other width."""
 
     def tried(reach: float, aimed: bool = True, high: bool = False) -> Ridge:
         track = _track(rough, full, pick, extent, hints, settings, progress, reach, aimed, high)
@@ -151,10 +153,16 @@ def _tried(
         refused = found
     with suppress(NoRidgeError):
         return tried(extent, high=True)
-    if isinstance(refused, _TooLargeError) and hints.width is None:
+    if not isinstance(refused, _RefusedError) or hints.width is not None:
+        raise refused
+    if refused.too_large:
         for n in range(_NARROWER):
             with suppress(NoRidgeError):
                 return tried(refused.width / LADDER ** (n + 1))
+    for step in _OTHER_WIDTHS:
+        hints = replace(hints, width=refused.width * LADDER**step)
+        with suppress(NoRidgeError):
+            return tried(extent)
     raise refused
 
 
@@ -190,10 +198,10 @@ def _track(
     track = finish_ends(full, track, settings)
     why = too_large(track, extent, settings)
     if why:
-        raise _TooLargeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width)
+        raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width, True)
     why = no_ridge(rough, track, pick, settings)
     if why:
-        raise NoRidgeError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}")
+        raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width)
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels.banded import factor, inverse_band, solve
 from ridgefeature.kernels.residual import INNER, OPTIONS
-from ridgefeature.kernels.strip import TERMS
+from ridgefeature.kernels.strip import TERMS, H, W
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -20,6 +20,9 @@ _BAND = 4 * TERMS
 _HARDEST = 1e6
 """Largest weight of a penalty, in parts of what the data say of a coefficient."""
 _LEAST_RIDGE = 1e-9
+_UNSURE = 8.0
+"""Variance of a weight's logarithm, times the differences that the data tell. Normal theory has 2; bands of
+heights and widths hold the truth with this."""
 
 
 @njit(**OPTIONS)
@@ -121,7 +124,8 @@ def most_likely(
     doubted: float = 1.0,
 ) -> tuple[Floats, Floats, Floats, float]:
     """Coefficients (n, 6), band of their covariance (6 n, 24) and weights (6,), most likely together; and how
-    many coefficients the data tell, in all.
+    many coefficients the data tell, in all. The covariance of heights and widths knows that weights are not
+    known for sure.
 
     wanted (6, n): of the differences of each term; weights: to begin with. There are always as many
     rounds: stopping early would let rounding decide on the result. doubted: as for `_next_weight`.
@@ -135,6 +139,7 @@ def most_likely(
         least[k] = _LEAST_RIDGE * size + 1e-300
         most[k] = _HARDEST * size + 1e-290
     lam = np.minimum(weights, most)
+    used, factored = lam.copy(), np.zeros_like(band)
     found, inverse, freedom = np.zeros(TERMS * n), np.zeros_like(band), 0.0
     for _ in range(rounds):
         whole, pull = band.copy(), right.copy()
@@ -142,17 +147,43 @@ def most_likely(
             for i in range(n):
                 whole[TERMS * i + k, 0] += least[k]
             _add_penalty(whole, pull, k, orders[k], lam[k], wanted[k])
-        factored, good = factor(whole)
+        tried, good = factor(whole)
         if not good:
             least *= 1e3
             continue
+        factored = tried
         found = solve(factored, pull)
         inverse = inverse_band(factored)
+        used[:] = lam
         freedom = 0.0
         for k in range(TERMS):
             freedom += orders[k] + _free(inverse, k, orders[k], lam[k])
             lam[k] = min(_next_weight(found, inverse, k, orders[k], lam[k], wanted[k], doubted), most[k])
+    if freedom > 0.0:
+        for k in (H, W):
+            _add_unsure(inverse, factored, found, k, orders[k], used[k], wanted[k])
     return found.reshape(n, TERMS), inverse, lam, freedom
+
+
+@njit(**INNER)
+def _add_unsure(
+    inverse: Floats, factored: Floats, found: Floats, term: int, order: int, weight: float, wanted: Floats
+) -> None:
+    """Add to a covariance what coefficients change where a term's weight is another one, as likely.
+
+    By the derivative of the coefficients by the weight's logarithm (Wood, Pya and Saefken 2016, equation 7).
+    """
+    left = _differences(found, term, order, wanted)
+    steps = _steps(order)
+    pull = np.zeros(found.size)
+    for d in range(left.size):
+        for k in range(order + 1):
+            pull[TERMS * (d + k) + term] += weight * steps[k] * left[d]
+    moved = solve(factored, pull)
+    variance = _UNSURE / max(_free(inverse, term, order, weight), 1.0)
+    for i in range(inverse.shape[0]):
+        for j in range(min(i + 1, _BAND)):
+            inverse[i, j] += variance * moved[i] * moved[i - j]
 
 
 @njit(**OPTIONS)
