@@ -33,7 +33,7 @@ _FOOT_STD = 0.0205
 """Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
 _FOOT_BLUR = 1.0, 0.3
 """The same in deviations of the noise that smears it; by likelihood less. By how far learned feet are off."""
-_HALF_BLUR = 0.12, 0.1
+_HALF_BLUR = 0.1, 0.095
 """What that adds to the width at half height: how points lie there is hardly known; by likelihood better."""
 _TOP_OFF = 2.0
 """Error of a section's height learned by likelihood, in standard deviations of its fit."""
