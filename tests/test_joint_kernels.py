@@ -81,6 +81,34 @@ def test_the_smoothness_is_that_of_the_data():
     assert 5 * TERMS < freedom < 0.6 * TERMS * n, "one and a half waves are told, not every coefficient"
 
 
+def test_bands_hold_what_another_smoothness_would_change():
+    """Against finite differences: the fit with a weight of the heights' penalty a little larger."""
+    n, m, rng = 20, 200, np.random.default_rng(4)
+    places = np.linspace(0, n - 3, m)
+    first, basis = basis_at(n, places)
+    matrix = np.tile(100.0 * np.eye(TERMS), (m, 1, 1))
+    goal = 100.0 * (np.sin(places / 3)[:, None] + rng.normal(0, 0.3, (m, TERMS)))
+    band, right = assembled(matrix, goal, first, basis, n)
+    orders, wanted = np.array(ORDERS), np.zeros((TERMS, n))
+    found, inverse, _, _ = most_likely(band, right, orders, wanted, np.ones(TERMS), 1)
+    step = np.ones(TERMS)
+    step[H] = 1.0 + 1e-6
+    change = (most_likely(band, right, orders, wanted, step, 1)[0] - found)[:, H] / 1e-6
+    dense = np.zeros((n, n))
+    for k in range(4):
+        i = np.arange(k, n)
+        np.add.at(dense, (i, i - k), band[TERMS * i + H, TERMS * k])
+    dense += np.tril(dense, -1).T
+    penalty = np.diff(np.eye(n), ORDERS[H], axis=0)
+    held = np.linalg.inv(dense + penalty.T @ penalty)
+    more = inverse[H::TERMS, 0] - np.diagonal(held)
+    ratio = more @ change**2 / (change**2 @ change**2)
+    assert ratio > 0
+    assert np.allclose(more, ratio * change**2, rtol=1e-3, atol=1e-3 * more.max())
+    free = n - ORDERS[H] - np.trace(penalty @ held @ penalty.T)
+    assert ratio == pytest.approx(5.0 / free, rel=1e-3)
+
+
 def straight(n: int = 21) -> tuple[np.ndarray, ...]:
     x = np.arange(float(n))
     axes = [np.tile(a, (n, 1)) for a in np.eye(3)]

@@ -425,3 +425,12 @@ def test_a_sharp_bend_is_followed_where_the_section_misses_by_more_than_the_nois
     ridge, seconds, _ = registered(case)
     assert ridge is not None
     assert score(case.truth, from_ridge(ridge, seconds)).failed == ()
+
+
+@pytest.mark.parametrize("seed", [2041, 2310])
+def test_a_ridge_that_begins_with_a_wrong_width_is_found_with_another(seed: int) -> None:
+    """What explains most about these picks is wider than the ridge, and leads nowhere."""
+    case = draw(seed)
+    ridge, seconds, _ = registered(case)
+    assert ridge is not None
+    assert score(case.truth, from_ridge(ridge, seconds)).failed == ()
