@@ -16,6 +16,8 @@ OTHER_WIDTH = 2.5
 """Factor between a width and that usual of a ridge from which on it is another one's."""
 SHORTEST = 1.5
 """Length in widths of the shortest ridge that is left of one whose data end, or that went astray."""
+_FEWEST = 4
+"""Stations that a cubic spline goes through."""
 _ALIKE, _ASTRAY = 1.33, 1.6
 """Factor between height or width and those that are usual up to which it is the same ridge; from which on a
 march may have gone astray."""
@@ -40,9 +42,8 @@ def longest_part(stations: Stations, good: Flags) -> Stations | None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]]))).reshape(-1, 2)
     first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
     low, high = s[first] + usual * (first > 0), s[last - 1] - usual * (last < len(s))
-    if high - low < SHORTEST * usual:
-        return None
-    return _part(stations, (s >= low) & (s <= high))
+    kept = (s >= low) & (s <= high)
+    return None if high - low < SHORTEST * usual or kept.sum() < _FEWEST else _part(stations, kept)
 
 
 def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Stations:
@@ -52,7 +53,7 @@ def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Statio
     """
     s, usual = stations.arc_length, float(np.median(stations.width))
     first, last = usual_ends(s, stations.width, open_ends)
-    if last - first == len(s) - 1 or s[last] - s[first] < SHORTEST * usual:
+    if last - first == len(s) - 1 or s[last] - s[first] < SHORTEST * usual or last - first + 1 < _FEWEST:
         return stations
     return _part(stations, (s >= s[first]) & (s <= s[last]))
 

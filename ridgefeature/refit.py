@@ -47,6 +47,8 @@ class Refit:
     closed: bool = False
     flat: bool = False
     """Whether the base was taken for flat across."""
+    sound: bool = True
+    """Whether one fit goes along all stations."""
 
 
 def refitted(
@@ -69,7 +71,7 @@ def refitted(
     if core is not None:
         again, sound = _refitted(grid, core, section, closed, (True, True), settings, None)
         found = again if sound else found
-    return _as_known(found, settings) if sound else found
+    return _as_known(found, settings) if sound else replace(found, sound=False)
 
 
 def _as_known(found: Refit, settings: Settings) -> Refit:

@@ -27,7 +27,7 @@ from ridgefeature.starts import LADDER, Hints
 from ridgefeature.stations import lay_out
 from ridgefeature.template import STEEP, Template
 from ridgefeature.valley import fitted_over_ground
-from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height
+from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height, unsound
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -110,7 +110,11 @@ def _constructed(
         section = section if found.joint is None else found.joint.section
         if found.closed:
             closed, stop = True, (CLOSED, CLOSED)
-        why = unknown_height(stations) or fin(stations.height, float(np.median(stations.width)), settings)
+        why = (
+            unsound(found.sound, track)
+            or unknown_height(stations)
+            or fin(stations.height, float(np.median(stations.width)), settings)
+        )
         if why:
             raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", track.templates[0].width)
     return Ridge(
@@ -154,7 +158,7 @@ def _tried(
     with suppress(NoRidgeError):
         return tried(extent, high=True)
     if not isinstance(refused, _RefusedError) or hints.width is not None:
-        raise refused
+        raise NoRidgeError(str(refused)) from None
     if refused.too_large:
         for n in range(_NARROWER):
             with suppress(NoRidgeError):
@@ -163,7 +167,7 @@ def _tried(
         hints = replace(hints, width=refused.width * LADDER**step)
         with suppress(NoRidgeError):
             return tried(extent)
-    raise refused
+    raise NoRidgeError(str(refused)) from None
 
 
 def _track(

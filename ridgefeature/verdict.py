@@ -13,6 +13,8 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 
+_FEW = 200
+"""Points of templates that may be too few for a whole fit."""
 _UNKNOWN = 0.5
 """Standard deviation of the height, in heights, beyond which most of a ridge is not told from its base."""
 
@@ -54,6 +56,16 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings)
         if evidence >= settings.distinct:
             return ""
     return f"a smooth surface or an edge explains it as well (evidence {evidence:.1f})"
+
+
+def unsound(sound: bool, track: Track) -> str:
+    """Why templates that no fit of the whole holds together are no ridge; empty if one does.
+
+    Each may explain its window, as about a body that bends away on all sides. Few points tell no whole fit.
+    """
+    if sound or sum(t.points for t in track.templates) < _FEW:
+        return ""
+    return "no ridge goes through all of what was found there"
 
 
 def unknown_height(stations: Stations) -> str:

@@ -42,6 +42,13 @@ def test_too_few_good_stations_are_no_ridge(good):
     assert longest_part(straight(41), good) is None
 
 
+def test_too_few_stations_for_a_spline_are_no_ridge_however_far_apart():
+    good = np.arange(21) >= 16
+    part = longest_part(straight(21), good)
+    assert part is not None and len(part.arc_length) == 4
+    assert longest_part(straight(21), np.arange(21) >= 17) is None
+
+
 def test_a_ridge_is_fitted_along_what_a_march_did_not_leave_it_on():
     """Over a fifth of its way the march goes off to the side, as high and wide as the ridge."""
     random = np.random.default_rng(0)

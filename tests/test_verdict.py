@@ -114,6 +114,30 @@ def test_there_is_no_ridge_on_surfaces_without_one(kind: str) -> None:
             rf.register(points, at=inner[rng.integers(len(inner))], kind="auto")
 
 
+def pipe(rng: np.random.Generator, noise: float) -> np.ndarray:
+    """Points (20000, 3) all round a cylinder of radius 10 about x, 100 long."""
+    turn, radius = rng.uniform(0, 2 * np.pi, 20_000), 10 + rng.normal(0, noise, 20_000)
+    return np.column_stack([rng.uniform(0, 100, 20_000), radius * np.cos(turn), radius * np.sin(turn)])
+
+
+def cube(rng: np.random.Generator, noise: float) -> np.ndarray:
+    """Points (20000, 3) all over a cube of side 40."""
+    points, face = rng.uniform(-20, 20, (20_000, 3)), rng.integers(0, 6, 20_000)
+    points[np.arange(20_000), face % 3] = np.where(face < 3, -20, 20)
+    return points + rng.normal(0, noise, points.shape)
+
+
+@pytest.mark.parametrize("kind", ["ridge", "auto"])
+@pytest.mark.parametrize(("body", "click"), [(pipe, (50, 10, 0)), (cube, (20, 20, 0)), (cube, (20, 20, 20))])
+def test_there_is_no_ridge_on_closed_bodies(body, click, kind: str) -> None:
+    """Each template may explain its window there, but no fit of the whole goes through all of them."""
+    for seed in range(3):
+        points = body(np.random.default_rng(seed), 0.1 + 0.2 * (seed % 2))
+        with pytest.raises(rf.NoRidgeError) as raised:
+            rf.register(points, at=click, kind=kind)
+        assert type(raised.value) is rf.NoRidgeError
+
+
 @pytest.mark.parametrize("seed", [33, 53, 92])
 def test_a_corner_is_no_ridge_on_a_curved_base(seed: int) -> None:
     """Its two planes no longer look like planes where its base is taken for curved."""
