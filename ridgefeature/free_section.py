@@ -153,9 +153,20 @@ class SectionStd:
     """Of its place."""
 
 
-def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: bool) -> SectionStd:
+def section_std(
+    told: Told,
+    seen: Smeared,
+    gap: float,
+    inflation: float,
+    exact: bool,
+    common: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> SectionStd:
     """How sure a learned section is; arguments as for `free_section`, `unseen_std` of its flanks, and whether
-    it is told by the likelihood, noise and all. One that has a name is as sure as its flanks."""
+    it is told by the likelihood, noise and all. One that has a name is as sure as its flanks.
+
+    common: variances of height, width and place, in heights and widths, that deviations of the ridge's terms
+    hold already: the section, stretched, is as free as they are.
+    """
     section = seen.section
     if section.name not in (LEARNED, FREE, box().name):
         return SectionStd(half_height_width=gap, width=gap)
@@ -174,15 +185,17 @@ def section_std(told: Told, seen: Smeared, gap: float, inflation: float, exact: 
         low, high = (level * top - sides) / slope[at, None]
         return low, high
 
-    def std(of: Array) -> float:
-        return math.sqrt(max(float(of @ covariance @ of), 0.0))
+    def std(of: Array, known: float) -> float:
+        return math.sqrt(max(float(of @ covariance @ of) - known, 0.0))
 
     (low, high), (left, right) = moved(0.5), moved(_TOP)
     blur = float(np.median(seen.blur))
-    half = math.hypot(std(high - low), _HALF_BLUR[exact] * blur, gap)
+    half = math.hypot(
+        std(high - low, section.half_height_width**2 * common[1]), _HALF_BLUR[exact] * blur, gap
+    )
     foot = math.hypot(_FOOT_STD, _FOOT_BLUR[exact] * blur)
-    height = (_TOP_OFF if exact else 1.0) * std(top)
-    return SectionStd(height, half, math.hypot(half, foot), std(0.5 * (left + right)))
+    height = (_TOP_OFF if exact else 1.0) * std(top, common[0])
+    return SectionStd(height, half, math.hypot(half, foot), std(0.5 * (left + right), common[2]))
 
 
 def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:

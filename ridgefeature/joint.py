@@ -88,7 +88,16 @@ class Joint:
         some, noise = _some(self.points), self.noise
         told = told_of(some, self.terms, self.seen, noise, self.exact)
         gap = unseen_std(some, self.terms, self.seen, noise.scale)
-        return section_std(told, self.seen, gap, self.inflation, self.exact)
+        return section_std(told, self.seen, gap, self.inflation, self.exact, self._common)
+
+    @property
+    def _common(self) -> tuple[float, float, float]:
+        """Variances of height, width and place, in heights and widths, by which the whole ridge may be off."""
+        h, w = (0.5 * (self.terms[1:, k] + self.terms[:-1, k]) for k in (H, W))
+        sizes = np.column_stack([h, h / w, h / w**2, w, h, w])
+        known = np.einsum("nij,ni,nj->ij", self.matrix, sizes, sizes)
+        variances = np.diagonal(np.linalg.pinv(known, hermitian=True))
+        return float(variances[H]), float(variances[W]), float(variances[E])
 
     def without(self, term: int) -> Joint:
         """The same where one term is 0."""

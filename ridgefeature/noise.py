@@ -31,7 +31,7 @@ _STRIP, _FEW, _TOGETHER = 0.1, 3, 3
 """Breadth of strips in widths; fewest points of a part one width long; such parts looked at together."""
 _SURE = 3.0
 """Standard deviations from which on such sums are correlated."""
-_CROSSING = 1.35
+_CROSSING = 1.6
 """What scan lines add to variances, in what strips show of it: lines cross strips, and go on beyond windows.
 Told by how often bands of heights hold the truth on banded scans: without it in 92 %."""
 _BLOCK = 5
@@ -134,7 +134,8 @@ def inflation_along(
     Told by sums over narrow strips beside each other along the ridge, each a width long.
 
     points (m, 3) in path coordinates and terms (n, 6) as in kernels.strip; distances (m,) from where points
-    are expected; shares (m,): chance that each is no stray; freedom: of the fit whose misfit that is. Points
+    are expected; shares (m,): chance that each is no stray; freedom: by how
+    much the fit made the squares of all sums less, negative if more. Points
     of one scan line may have an error in common: where such lines run along the ridge their sums tell far
     less than so many points would.
     """
