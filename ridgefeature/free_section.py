@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,7 +13,7 @@ from ridgefeature.basis import basis_matrix
 from ridgefeature.kernels.section_sums import cell_sums, spline_sums
 from ridgefeature.kernels.strip import A, B, C, E, H, W
 from ridgefeature.one_hump import one_hump, symmetric_hump
-from ridgefeature.section import Section, box
+from ridgefeature.section import Section
 from ridgefeature.smearing import Smeared, likelihood_section_scores
 
 Array = NDArray[np.float64]
@@ -29,16 +28,6 @@ LEARNED = "learned"
 _LOW = (0.04, 0.1, 0.25)
 """Heights whose places tell where the feet are."""
 _ROOTS = np.array(_LOW) ** (1.0 / np.linspace(2.0, 3.0, 21)[:, None])
-_FOOT_STD = 0.0205
-"""Of the width between feet, in widths: whether they are parabolas or cubics is not seen."""
-_FOOT_BLUR = 1.0, 0.3
-"""The same in deviations of the noise that smears it; by likelihood less. By how far learned feet are off."""
-_HALF_BLUR = 0.1, 0.095
-"""What that adds to the width at half height: how points lie there is hardly known; by likelihood better."""
-_TOP_OFF = 2.0
-"""Error of a section's height learned by likelihood, in standard deviations of its fit."""
-_TOP = 0.95
-"""The apex is midway between the places of this height."""
 _ROUNDS, _LEAST_SPANS = 8, 20
 _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 """Of three coefficients, in the height at the middle one's knot."""
@@ -95,8 +84,8 @@ def free_section(
     known = np.diagonal(matrix)
     if not (np.isfinite(matrix).all() and (known[-3:] > 0).all() and (known[:-3] > 0).any()):
         return None
-    top = _top(section, spans, wider) if split else None
-    found, freedom, inverse = _smoothest(matrix, right, spans, top)
+    top = top_knots(section, spans, wider) if split else None
+    found, freedom, inverse = smoothest_section(matrix, right, spans, top)
     if not found[3:-6].max() > 0:
         return None
     cost = 0.5 * price * freedom
@@ -141,64 +130,7 @@ def trimmed(section: Section) -> tuple[Section, float, float]:
     return Section(np.asarray(raised, dtype=np.float64), LEARNED), middle, breadth
 
 
-@dataclass(frozen=True)
-class SectionStd:
-    """Standard deviations that a learned section adds along the whole ridge alike."""
-
-    height: float = 0.0
-    """In heights; the others in widths."""
-    half_height_width: float = 0.0
-    width: float = 0.0
-    apex: float = 0.0
-    """Of its place."""
-
-
-def section_std(
-    told: Told,
-    seen: Smeared,
-    gap: float,
-    inflation: float,
-    exact: bool,
-    common: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> SectionStd:
-    """How sure a learned section is; arguments as for `free_section`, `unseen_std` of its flanks, and whether
-    it is told by the likelihood, noise and all. One that has a name is as sure as its flanks.
-
-    common: variances of height, width and place, in heights and widths, that deviations of the ridge's terms
-    hold already: the section, stretched, is as free as they are.
-    """
-    section = seen.section
-    if section.name not in (LEARNED, FREE, box().name):
-        return SectionStd(half_height_width=gap, width=gap)
-    spans = section.spans
-    inverse = _smoothest(*told(spans, 1.0), spans, _top(section, spans, 1.0) if exact else None)[2]
-    covariance = inflation * inverse[:-3, :-3]
-    eta = np.linspace(-0.5, 0.5, 2001)
-    f = section(eta)
-    knots, slope = np.arange(-3.0, spans + 4.0), section(eta, 1)
-    top = basis_matrix(knots, 3, (eta[[np.argmax(f)]] + 0.5) * spans)[0]
-
-    def moved(level: float) -> tuple[Array, Array]:
-        """How the lowest and the highest place at a level move with the coefficients."""
-        at = np.flatnonzero(f >= level)[[0, -1]]
-        sides = basis_matrix(knots, 3, (eta[at] + 0.5) * spans)
-        low, high = (level * top - sides) / slope[at, None]
-        return low, high
-
-    def std(of: Array, known: float) -> float:
-        return math.sqrt(max(float(of @ covariance @ of) - known, 0.0))
-
-    (low, high), (left, right) = moved(0.5), moved(_TOP)
-    blur = float(np.median(seen.blur))
-    half = math.hypot(
-        std(high - low, section.half_height_width**2 * common[1]), _HALF_BLUR[exact] * blur, gap
-    )
-    foot = math.hypot(_FOOT_STD, _FOOT_BLUR[exact] * blur)
-    height = (_TOP_OFF if exact else 1.0) * std(top, common[0])
-    return SectionStd(height, half, math.hypot(half, foot), std(0.5 * (left + right), common[2]))
-
-
-def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
+def top_knots(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
     """Which knots (spans + 1,) of a spline over `wider` widths lie on the top of a section."""
     high = np.flatnonzero(section((np.arange(spans + 1) / spans - 0.5) * wider) > _HIGH)
     top = np.zeros(spans + 1, dtype=np.bool_)
@@ -206,7 +138,7 @@ def _top(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
     return top
 
 
-def _smoothest(
+def smoothest_section(
     matrix: Array, right: Array, spans: int, top: NDArray[np.bool_] | None = None
 ) -> tuple[Array, float, Array]:
     """Coefficients of largest restricted likelihood (as in ridgefeature.smoothing), effective number and

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.beyond import continued
-from ridgefeature.free_section import FREE, SectionStd, section_std
+from ridgefeature.free_section import FREE
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
 from ridgefeature.kernels.strip import TERMS, A, C, E, H, W, offsets, places_across
@@ -17,6 +17,7 @@ from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
 from ridgefeature.section import Section, box
+from ridgefeature.section_std import SectionStd, section_std
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, told_of
 from ridgefeature.smearing import Smeared, log_likelihood
@@ -92,7 +93,7 @@ class Joint:
 
     @property
     def _common(self) -> tuple[float, float, float]:
-        """Variances of height, width and place, in heights and widths, by which the whole ridge may be off."""
+        """Variances of height, width and place, in heights and widths, by which all of it may be off."""
         h, w = (0.5 * (self.terms[1:, k] + self.terms[:-1, k]) for k in (H, W))
         sizes = np.column_stack([h, h / w, h / w**2, w, h, w])
         known = np.einsum("nij,ni,nj->ij", self.matrix, sizes, sizes)

@@ -13,6 +13,7 @@ from ridgefeature.foot_points import information as foot_information
 from ridgefeature.kernels.strip import C, W, information, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame
+from ridgefeature.scan_lines import scan_lines
 from ridgefeature.section import Section
 from ridgefeature.smearing import Smeared, likelihood_scores, log_likelihood, smear
 from ridgefeature.smoothing import Smooth, smoothest
@@ -125,13 +126,12 @@ def improved(
         matrix, goal, gain = *_by_likelihood(points, replace(state, noise=noise)), 1.0
     if not np.isfinite(matrix).all() or not np.isfinite(gain):
         return None
-    if shared or state.fit is None:  # what the fit before did not see is no misfit of it
-        inflation = state.inflation
-    else:
-        inflation = inflation_of(gain * matrix, gain * goal)
+    # What the fit before did not look at is no misfit of it.
+    seen_before = state.fit is not None and not shared
+    inflation = inflation_of(gain * matrix, gain * goal) if seen_before else state.inflation
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
     if shared:
-        local = _in_common(points, state, noise, len(task.some))
+        local = _in_common(points, path, state, noise, len(task.some))
         known, inflation = gain / np.maximum(inflation, local), max(inflation, float(np.median(local)))
         matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
     else:
@@ -184,7 +184,7 @@ def _by_likelihood(points: Array, state: State) -> tuple[Array, Array]:
     return likelihood_scores(points, state.terms, state.section, *told)
 
 
-def _in_common(points: Array, state: State, noise: Noise, fitted: int) -> Array:
+def _in_common(points: Array, path: PathFrame, state: State, noise: Noise, fitted: int) -> Array:
     """Variance of sums over the points of each stretch, by that of independent noise.
 
     fitted: to how many of the points the state was. It follows their errors, which makes sums smaller, and
@@ -194,7 +194,9 @@ def _in_common(points: Array, state: State, noise: Noise, fitted: int) -> Array:
     off, far = offsets(points, terms, state.seen.told, scale)
     shares = 1.0 / (1.0 + noise.density * np.exp(np.minimum(0.5 * (far / scale) ** 2, 50.0)))
     followed = _IN_STRIPS * (2.0 - len(points) / fitted) * state.freedom
-    return inflation_along(points, terms, off, shares, scale, followed)
+    found = inflation_along(points, terms, off, shares, scale, followed)
+    lines = scan_lines(points, path, shares * np.copysign(far, off))
+    return found if lines is None else np.maximum(found, lines.inflation(path))
 
 
 def _by_foot_points(

@@ -54,7 +54,7 @@ def stations_of(
     normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
     bend = np.abs((np.gradient(tangent, even, axis=0) * np.cross(normal, tangent)).sum(axis=1))
     curvature, height, width = values.T
-    width = np.maximum(width, _NARROWEST * np.median(width))
+    width = np.maximum(width, _NARROWEST * np.median(joint.terms[:, W]))  # those are never negative
     usual = float(np.median(height))
     height = np.copysign(np.maximum(height * np.sign(usual), _LOWEST * abs(usual)), usual)
     half = joint.section.half_height_width

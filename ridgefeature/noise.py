@@ -31,9 +31,9 @@ _STRIP, _FEW, _TOGETHER = 0.1, 3, 3
 """Breadth of strips in widths; fewest points of a part one width long; such parts looked at together."""
 _SURE = 3.0
 """Standard deviations from which on such sums are correlated."""
-_CROSSING = 1.6
+_CROSSING = 3.0
 """What scan lines add to variances, in what strips show of it: lines cross strips, and go on beyond windows.
-Told by how often bands of heights hold the truth on banded scans: without it in 92 %."""
+Told by how often bands of heights hold the truth on banded scans."""
 _BLOCK = 5
 """Nodes over which noise may be correlated."""
 _MEDIAN = 0.89

@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 _PRICE = 4.0
 """Of a section's coefficient, in twice the log likelihood ratio: chance pays so much for five of them once in
-a thousand times. The logarithm of the number of points keeps a section that is near the ridge's, but is not it,
-until it spoils the height by several standard deviations."""
+a thousand times. The logarithm of the number of points (BIC) keeps a section that is near the ridge's, but is
+not it, until it spoils the height by several standard deviations."""
 
 
 def told_of(points: Array, terms: Array, seen: Smeared, noise: Noise, exact: bool) -> Told:

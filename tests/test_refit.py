@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from oracles import SPIRAL, apex, spiral_points, spiral_ridge
+from scipy.spatial import cKDTree
 
 import ridgefeature as rf
 from ridgefeature.free_section import trimmed
 from ridgefeature.grid import build_grid
+from ridgefeature.joint_stations import stations_of
 from ridgefeature.kernels.strip import rectified
 from ridgefeature.path_frame import path_frame, points_along
 from ridgefeature.refit import refitted
@@ -129,7 +132,37 @@ def test_too_few_points_leave_the_stations_as_they_are():
     assert found.stations is ridge and found.joint is None and found.end_interval is None
 
 
+def test_widths_are_never_negative_whatever_a_fit_says():
+    """A fit that is no ridge's may have them: along its path no points would be found, and no end."""
+    found = refitted(
+        build_grid(spiral_points(3000)), spiral_ridge(), bell(), False, (False, False), Settings()
+    )
+    joint = found.joint
+    assert joint is not None
+    turned = replace(joint, smooth=joint.smooth.changed(np.diag([1.0, 1.0, 1.0, 1.0, 1.0, -1.0])))
+    assert (stations_of(turned, 41, Settings()).width > 0).all()
+
+
 # Sections
+
+
+def cosine_scan(seed: int) -> np.ndarray:
+    """Points (30000, 3) of a winding ridge 4 + 0.03 x high and 12 wide, its section exactly a cosine."""
+    random, t = np.random.default_rng(seed), np.linspace(-60, 60, 6001)
+    xy = random.uniform(-50, 50, (30_000, 2))
+    eta = cKDTree(np.column_stack([t, 10 * np.sin(t / 20)])).query(xy)[0] / 12
+    z = (4 + 0.03 * xy[:, 0]) * np.where(eta < 0.5, 0.5 + 0.5 * np.cos(2 * np.pi * eta), 0.0)
+    return np.column_stack([xy, z]) + random.normal(0, 0.2, (30_000, 3))
+
+
+def test_a_section_that_is_only_near_the_points_does_not_spoil_the_height():
+    """The section named cosine is off by 2 % near the feet, less than any one point's noise."""
+    for seed in (1, 2, 7):
+        ridge = rf.register(cosine_scan(seed), at=(0, 0, 4))
+        inner = np.abs(ridge.spine[:, 0]) < 46
+        off = (ridge.height - 4 - 0.03 * ridge.spine[:, 0])[inner].mean()
+        assert abs(off) < 2.0 * np.median(ridge.height_std[inner])
+        assert ridge.height_std[inner].max() < 0.06
 
 
 def test_an_asymmetric_section_is_found():
