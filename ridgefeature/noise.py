@@ -31,7 +31,7 @@ _STRIP, _FEW, _TOGETHER = 0.1, 3, 3
 """Breadth of strips in widths; fewest points of a part one width long; such parts looked at together."""
 _SURE = 3.0
 """Standard deviations from which on such sums are correlated."""
-_CROSSING = 3.0
+_CROSSING = 1.35
 """What scan lines add to variances, in what strips show of it: lines cross strips, and go on beyond windows.
 Told by how often bands of heights hold the truth on banded scans."""
 _BLOCK = 5

@@ -14,13 +14,13 @@ Array = NDArray[np.float64]
 
 _ENOUGH, _FEWEST = 4500, 200
 """Points that tell lines; fewest that do."""
-_ANGLES, _AROUND, _NEAR = 36, 7, 0.06
+_ANGLES, _AROUND, _NEAR = 36, 9, 0.1
 """Directions that are tried; and then so many around the best, up to so far from it."""
 _SHORT, _LONG = 0.5, 1.0
 """Parts of lines that are looked at, in widths: with many directions, with those around the best."""
 _SURE = 5.0
 """Standard deviations from which on errors in lines are no chance: of many directions one is large."""
-_LOST = 2.0
+_LOST = 3.0
 """Share of the variance that a line has in common, by that which is seen: lines are not where they are
 thought, and the fit follows them."""
 _ALONG, _ACROSS = 5.0, 0.25

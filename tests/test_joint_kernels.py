@@ -106,7 +106,7 @@ def test_bands_hold_what_another_smoothness_would_change():
     assert ratio > 0
     assert np.allclose(more, ratio * change**2, rtol=1e-3, atol=1e-3 * more.max())
     free = n - ORDERS[H] - np.trace(penalty @ held @ penalty.T)
-    assert ratio == pytest.approx(5.0 / free, rel=1e-3)
+    assert ratio == pytest.approx(2.0 / free, rel=1e-3)
 
 
 def straight(n: int = 21) -> tuple[np.ndarray, ...]:

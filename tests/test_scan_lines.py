@@ -64,7 +64,7 @@ def test_lines_are_found_in_all_directions_wherever_the_ridge_goes(heading: floa
     found = scan_lines(*with_path(path, heading, 0.3))
     assert found is not None
     assert abs((found.heading - heading + np.pi / 2) % np.pi - np.pi / 2) < 0.06
-    assert 0.15 < found.share < 0.6
+    assert 0.3 < found.share < 0.9  # of a fit to such points less is seen
 
 
 def with_path(path: PathFrame, heading: float, share: float, seed: int = 0) -> tuple:

@@ -20,9 +20,8 @@ _BAND = 4 * TERMS
 _HARDEST = 1e6
 """Largest weight of a penalty, in parts of what the data say of a coefficient."""
 _LEAST_RIDGE = 1e-9
-_UNSURE = 3.0
-"""Variance of a weight's logarithm, times the differences that the data tell. Normal theory has 2; bands of
-heights and widths hold the truth with this."""
+_UNSURE = 2.0
+"""Variance of a weight's logarithm, times the differences that the data tell, by normal theory."""
 
 
 @njit(**OPTIONS)
