@@ -42,11 +42,10 @@ def _one_flank(places: Array, at: float) -> float:
 
     Gaps are counted without what such points usually lie apart.
     """
-    ordered = np.sort(places)
-    i, n = int(np.searchsorted(ordered, at)), len(ordered)
-    before = float(ordered[i - _ENDS]) if i >= _ENDS else 0.0
-    after = float(ordered[i + _ENDS - 1]) if i + _ENDS <= n else max(0.5, at)
-    usual = _USUAL * _ENDS * float(ordered[-1]) / n if n else 0.0
+    inner, outer, n = places[places < at], places[places >= at], len(places)
+    before = float(np.partition(inner, -_ENDS)[-_ENDS]) if len(inner) >= _ENDS else 0.0
+    after = float(np.partition(outer, _ENDS - 1)[_ENDS - 1]) if len(outer) >= _ENDS else max(0.5, at)
+    usual = _USUAL * _ENDS * float(places.max()) / n if n else 0.0
     if after - before <= usual:
         return 0.0
     share = 1.0 - usual / (after - before)
