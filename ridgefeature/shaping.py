@@ -25,9 +25,9 @@ from ridgefeature.smearing import Smeared, smear
 Array = NDArray[np.float64]
 
 _PRICE = 4.0
-"""Of a section's coefficient, in twice the log likelihood ratio: chance pays so much for five of them once in
-a thousand times. The logarithm of the number of points (BIC) keeps a section that is near the ridge's, but is
-not it, until it spoils the height by several standard deviations."""
+"""Of a free section's coefficient, in twice the log likelihood ratio: chance pays so much for five of them
+once in a thousand times. The logarithm of the number of points (BIC) keeps a section that is near the
+ridge's, but is not it, until it spoils the height by several standard deviations."""
 
 
 def told_of(points: Array, terms: Array, seen: Smeared, noise: Noise, exact: bool) -> Told:
@@ -46,7 +46,7 @@ def shaped(
     such noise smears it; inflation: variance of sums over neighbouring points, by what it would be if their
     noise was independent.
     """
-    section, price = seen.section, _PRICE
+    section, price = seen.section, np.log(len(points))
     wider = 1.0 if section.name == FREE else WIDER
     equations = told_of(points, terms, seen, noise, exact)(SPANS, wider)
     if section.name in SECTIONS and not exact:
@@ -54,7 +54,7 @@ def shaped(
         if own.loss - named.loss > inflation * price:
             return named.section, named.applied(terms)
     found = free_section(lambda *_: equations, section, len(points), SPANS, inflation * price, wider, exact)
-    if found is None or (section is not box() and found.gain / inflation < price * found.freedom):
+    if found is None or (section is not box() and found.gain / inflation < _PRICE * found.freedom):
         return section, terms
     return found.applied(terms)
 
@@ -67,7 +67,7 @@ def between_feet(
     terms = terms.copy()
     terms[:, E] += middle * terms[:, W]
     terms[:, W] *= breadth
-    seen, price = smear(section, terms, noise.blur, noise.even), inflation * _PRICE
+    seen, price = smear(section, terms, noise.blur, noise.even), inflation * np.log(len(points))
     told = told_of(points, terms, seen, noise, exact)
     found = free_section(told, section, len(points), section.spans, price, 1.0, exact)
     return (section, terms) if found is None else found.applied(terms, LEARNED)

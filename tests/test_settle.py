@@ -105,6 +105,17 @@ def test_a_real_weld_wall_does_not_fold():
     assert (apart < 20).all()
 
 
+@pytest.mark.skipif(not (SCANS / "waam_weld_wall.npz").is_file(), reason="RIDGE_SCANS holds no such scan")
+def test_a_real_weld_wall_has_one_crest():
+    """What few points tell of its unseen flanks is no crest of its own."""
+    with np.load(SCANS / "waam_weld_wall.npz") as scan:
+        points = scan["points"]
+    found = rf.register(points, at=(12.026470184326172, -11.725231170654297, -235.6444549560547))
+    height = found.section(np.linspace(-0.5, 0.5, 1001))
+    rises = np.sign(np.diff(height))
+    assert (np.diff(rises[rises != 0]) < 0).sum() == 1
+
+
 # A refit keeps its place
 
 
