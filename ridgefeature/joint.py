@@ -12,7 +12,8 @@ from ridgefeature.beyond import continued
 from ridgefeature.free_section import FREE
 from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
-from ridgefeature.kernels.strip import TERMS, A, C, E, H, W, offsets, places_across
+from ridgefeature.kernels.section_sums import misfit_sums
+from ridgefeature.kernels.strip import TERMS, A, C, E, H, W
 from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
@@ -252,7 +253,9 @@ def _joint(task: Task, points: Array, state: State, fit: Fit, flats: float) -> J
     count = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches]
     girth = flats + 1.0 + noise.even * (_girths(state.section, terms) - 1.0)
     counts = count / (girth * task.path.width[1:] ** 2)
-    misfit = _misfit(task.some, terms, state.seen, noise.scale)
+    misfit = misfit_sums(
+        task.some, terms, state.seen.told, noise.scale, least_noise(terms), _FAR_OFF, state.section.top
+    )
     told = fit.smooth, terms, state.section, fit.matrix, fit.goal, counts, misfit
     return Joint(task.path, points, *told, noise, state.inflation, state.seen, fit.exact)
 
@@ -272,19 +275,6 @@ def _girths(section: Section, terms: Array) -> Array:
     steep = np.abs(terms[:, H] / terms[:, W])
     slope = section(np.linspace(-0.5, 0.5, _GIRTH), 1)
     return np.asarray(np.hypot(1.0, 0.5 * (steep[1:] + steep[:-1])[:, None] * slope).mean(axis=1))
-
-
-def _misfit(points: Array, terms: Array, seen: Smeared, scale: float) -> Array:
-    """(n - 1, 3) as Joint.misfit has it."""
-    eta = places_across(points, terms)
-    on = np.abs(eta) < 0.5
-    place, eta = points[on, 0].astype(np.int64), eta[on]
-    off = offsets(points[on], terms, seen.told, scale)[0]
-    far = np.minimum((off / max(scale, least_noise(terms))) ** 2, _FAR_OFF)
-    low, high = seen.section.top
-    top = (eta > low) & (eta < high) & (far < _FAR_OFF)
-    told = [np.bincount(place, weights, len(terms) - 1) for weights in (None, far, top)]
-    return np.column_stack(told).astype(np.float64)
 
 
 def least_noise(terms: Array) -> float:

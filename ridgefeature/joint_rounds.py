@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ridgefeature.foot_points import distances
 from ridgefeature.foot_points import information as foot_information
-from ridgefeature.kernels.strip import C, W, information, mixture, offsets
+from ridgefeature.kernels.information import information
+from ridgefeature.kernels.strip import C, W, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame
 from ridgefeature.scan_lines import scan_lines

@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ridgefeature.kernels.banded import factor, inverse_band, solve
+from ridgefeature.kernels.information import information
 from ridgefeature.kernels.penalised import assembled, most_likely
-from ridgefeature.kernels.strip import TERMS, A, H, W, information, mixture, offsets, rectified
+from ridgefeature.kernels.section_sums import misfit_sums
+from ridgefeature.kernels.strip import TERMS, A, H, W, mixture, offsets, rectified
 from ridgefeature.section import bell
 from ridgefeature.smearing import smear
 from ridgefeature.smoothing import ORDERS, basis_at
@@ -195,3 +197,31 @@ def test_information_is_the_sum_over_the_points_whatever_their_order():
         assert np.allclose(a, b, rtol=1e-9, atol=1e-6)
     assert whole[2][0] == len(points)
     assert (np.diagonal(whole[0], axis1=1, axis2=2)[:, A] > 0).all()
+
+
+def test_information_is_that_of_each_point_which_tells_one_thing():
+    points, terms = scene(0.02, 0.1, n=60)
+    seen = smear(bell(), terms, 0.02, 0.0).told
+    whole, each = information(points, terms, seen, 0.02, 0.1), np.zeros((100, TERMS, TERMS))
+    for point in points:
+        matrix, right, sums = information(point[None], terms, seen, 0.02, 0.1)
+        j = int(point[0])
+        r = offsets(point[None], terms, seen, 0.02)[0][0] / 0.02
+        if right[j].any():
+            assert np.allclose(matrix[j], np.outer(right[j], right[j]) / (sums[1] * r * r), rtol=1e-8)
+        each += matrix
+    assert np.allclose(whole[0], each, rtol=1e-9)
+
+
+def test_misfits_are_those_of_the_points_between_the_feet():
+    points, terms = scene(0.02, 0.2, n=3000)
+    section, scale, least, most = bell(), 0.02, 0.03, 9.0
+    seen = smear(section, terms, scale, 0.0)
+    found = misfit_sums(points, terms, seen.told, scale, least, most, section.top)
+    eta = points[:, 1] / terms[0, W]
+    square = np.minimum((offsets(points, terms, seen.told, scale)[0] / least) ** 2, most)
+    top = (np.abs(eta) < section.top[1]) & (square < most)
+    on = np.abs(eta) < 0.5
+    told = [np.bincount(points[on, 0].astype(int), w, 100) for w in (on[on], square[on], top[on])]
+    assert np.allclose(found, np.column_stack(told), rtol=1e-9)
+    assert 0 < found[:, 2].sum() < found[:, 0].sum() < len(points)

@@ -22,19 +22,24 @@ Floats = NDArray[np.float64]
 def factor(band: Floats) -> tuple[Floats, bool]:
     """The lower band of Cholesky's factor, and whether the matrix is positive definite."""
     n, m = band.shape[0], band.shape[1] - 1
-    out = np.zeros_like(band)
-    for i in range(n):
-        first = max(0, i - m)
-        for j in range(first, i + 1):
-            total = band[i, i - j]
-            for k in range(max(first, j - m), j):
-                total -= out[i, i - k] * out[j, j - k]
-            if j < i:
-                out[i, i - j] = total / out[j, 0]
-            elif total > 0.0:
-                out[i, 0] = math.sqrt(total)
-            else:
-                return out, False
+    # By columns, and what each changes of those after it at once: then all loops run along rows.
+    columns, out, column = np.zeros((n, m + 1)), np.zeros_like(band), np.empty(m + 1)
+    for j in range(n):
+        for k in range(min(m, n - 1 - j) + 1):
+            columns[j, k] = band[j + k, k]
+    for j in range(n):
+        own = columns[j]
+        if not own[0] > 0.0:
+            return out, False
+        scale = 1.0 / math.sqrt(own[0])
+        for k in range(m + 1):
+            column[k] = scale * own[k]
+        for i in range(min(m, n - 1 - j) + 1):
+            out[j + i, i] = column[i]
+        for i in range(1, min(m, n - 1 - j) + 1):
+            after, entry = columns[j + i], column[i]
+            for k in range(m + 1 - i):
+                after[k] -= entry * column[i + k]
     return out, True
 
 

@@ -1,4 +1,4 @@
-"""Sums over the points of a ridge: what all of them say of its section, what neighbours have in common."""
+"""Sums over the points of a ridge: what they say of its section, by how much they miss it, and in common."""
 
 from __future__ import annotations
 
@@ -87,6 +87,39 @@ def spline_sums(
         for p in range(k):
             matrix[p, k] = matrix[k, p]
     return matrix, right
+
+
+@njit(**OPTIONS)
+def misfit_sums(
+    points: Floats,
+    terms: Floats,
+    seen: Seen,
+    scale: float,
+    least: float,
+    most: float,
+    top: tuple[float, float],
+) -> Floats:
+    """Points between the feet of each stretch (nodes - 1, 3): how many, the sum of their squared distances in
+    noises, and how many lie near the top and are no strays.
+
+    points, terms, seen and scale as in kernels.strip; least: noise that distances are measured by, at least;
+    most: of a squared distance, from which on a point is a stray; top: places in widths between which it is.
+    """
+    values, reach, stride = seen
+    out = np.zeros((terms.shape[0] - 1, 3))
+    for i in range(points.shape[0]):
+        j, there = terms_at(terms, points[i, 0])
+        eta = (points[i, 1] - there[3]) / there[5]
+        if not abs(eta) < 0.5:
+            continue
+        own = values[np.int64(points[i, 0] / stride + 0.5)]
+        off = seen_at(points[i, 1], points[i, 2], there, own, reach, scale)[0] * scale / max(scale, least)
+        square = min(off * off, most)
+        out[j, 0] += 1.0
+        out[j, 1] += square
+        if top[0] < eta < top[1] and square < most:
+            out[j, 2] += 1.0
+    return out
 
 
 @njit(**OPTIONS)
