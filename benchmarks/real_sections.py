@@ -1,6 +1,6 @@
 """What the points of real scans show across known tracks, beside what was read off and what is registered.
 
-    python benchmarks/real_sections.py SCANS [--out DIR] [--only NAME]
+    python benchmarks/real_sections.py SCANS [--out DIR] [--only NAME] [--page FILE]
 
 SCANS is a folder as benchmarks/real_clicks.py has it. The points' own estimate uses no fit and no section: at
 places along the track a slab of points is cut across it, half the read width to either side; heights over the
@@ -9,7 +9,8 @@ chord from the top to the bin at the reach; the base is the straight line betwee
 turned level. Height is that of the top over it, width that between the places at half of that height; where
 bins are empty there it is known only between two values, and both are told. Medians over 25 places. DIR gets
 a picture a track: points, their medians, feet and width; the registered section; and the read height and
-width, on the same base. Deterministic.
+width, on the same base. FILE gets one page of the tracks whose registered height or width is out of the
+limits (10 %, 15 %) about what was read. Deterministic.
 Of a curved body the ground between the feet bulges above that line: there a registered height is lower.
 """
 
@@ -19,14 +20,17 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from real_clicks import Track, even, tracks
 
 import ridgefeature as rf
 
 Array = NDArray[np.float64]
-BIN, REACH, ENOUGH, PLACES, PICTURES = 0.1, 1.6, 3, 25, 6
+BIN, REACH, ENOUGH, PLACES, PICTURES, A_ROW = 0.1, 1.6, 3, 25, 6, 4
+LIMITS = 0.10, 0.15
 _AHEAD = 0.05
 """Part of the track ahead and behind that tells its direction."""
 _TALL = 2.5
@@ -63,6 +67,22 @@ class Across:
     def widths(self) -> tuple[float, float]:
         """Least and largest."""
         return self.sides[2] - self.sides[1], self.sides[3] - self.sides[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A track, what its points show at places along it, the registered ridge, and its line in the table."""
+
+    track: Track
+    seen: list[Across]
+    ridge: rf.Ridge
+    line: str
+    rates: tuple[float, float]
+    """Registered height and width, by those read."""
+
+    @property
+    def beyond(self) -> bool:
+        return any(abs(rate - 1.0) > limit for rate, limit in zip(self.rates, LIMITS, strict=True))
 
 
 def frame_at(track: Track, place: float) -> tuple[Array, Array]:
@@ -151,47 +171,69 @@ def section_in(seen: Across, ridge: rf.Ridge) -> tuple[int, Array, Array]:
     return k, found[0], found[1]
 
 
-def picture(track: Track, seen: list[Across], ridge: rf.Ridge, line: str, file: Path) -> None:
-    import matplotlib.pyplot as plt
+def drawn(ax: Axes, track: Track, one: Across, ridge: rf.Ridge) -> None:
+    """What points, reading and registered section say at one place."""
+    w, h, base = track.width, track.height, one.base
+    k, section, ground = section_in(one, ridge)
+    y, top = one.middles[one.top], one.medians[one.top]
+    middle = 0.25 * sum(one.sides)
+    ax.plot(one.points[:, 0] / w, (one.points[:, 1] - base) / h, ".", color="0.7", ms=3)
+    ax.plot(one.middles / w, (one.medians - base) / h, "k.-", lw=1, label="points, medians")
+    ax.plot(section[:, 0] / w, (section[:, 1] - base) / h, "r", label="registered")
+    ax.plot(ground[:, 0] / w, (ground[:, 1] - base) / h, "r:", lw=1)
+    feet = list(one.feet)
+    ax.plot(one.middles[feet] / w, (one.medians[feet] - base) / h, "k^", ms=8, label="feet")
+    half = 0.5 * (top - base) / h
+    ax.plot([one.sides[0] / w, one.sides[3] / w], [half, half], "k--", lw=2, label="width, points")
+    ax.plot([middle / w - 0.5, middle / w + 0.5], [0.5, 0.5], "b", lw=2, label="read: width, height")
+    ax.plot([y / w, y / w], [0, 1], "b", lw=1)
+    least, most = one.widths
+    width = f"{least / w:.2f}" if most - least < BIN * w else f"{least / w:.2f} to {most / w:.2f}"
+    own = abs(ridge.height[k]) / h, ridge.half_height_width[k] / w
+    ax.set_title(
+        f"points: h {one.height / h:.2f}, w {width}\nregistered: h {own[0]:.2f}, w {own[1]:.2f}", fontsize=10
+    )
+    ax.grid(alpha=0.3)
 
-    chosen = [seen[i] for i in np.linspace(0, len(seen) - 1, min(PICTURES, len(seen))).round().astype(int)]
+
+def spread(seen: list[Across], count: int) -> list[Across]:
+    return [seen[i] for i in np.linspace(0, len(seen) - 1, min(count, len(seen))).round().astype(int)]
+
+
+def picture(found: Found, file: Path) -> None:
+    """One track at several places."""
+    chosen = spread(found.seen, PICTURES)
     figure, axes = plt.subplots(2, (len(chosen) + 1) // 2, figsize=(15, 8), squeeze=False)
     for ax, one in zip(axes.flat, chosen, strict=False):
-        w, h, base = track.width, track.height, one.base
-        k, section, ground = section_in(one, ridge)
-        y, top = one.middles[one.top], one.medians[one.top]
-        middle = 0.25 * sum(one.sides)
-        ax.plot(one.points[:, 0] / w, (one.points[:, 1] - base) / h, ".", color="0.7", ms=3)
-        ax.plot(one.middles / w, (one.medians - base) / h, "k.-", lw=1, label="points, medians")
-        ax.plot(section[:, 0] / w, (section[:, 1] - base) / h, "r", label="registered")
-        ax.plot(ground[:, 0] / w, (ground[:, 1] - base) / h, "r:", lw=1)
-        feet = list(one.feet)
-        ax.plot(one.middles[feet] / w, (one.medians[feet] - base) / h, "k^", ms=8, label="feet")
-        half = 0.5 * (top - base) / h
-        ax.plot([one.sides[0] / w, one.sides[3] / w], [half, half], "k--", lw=2, label="width, points")
-        ax.plot([middle / w - 0.5, middle / w + 0.5], [0.5, 0.5], "b", lw=2, label="read: width, height")
-        ax.plot([y / w, y / w], [0, 1], "b", lw=1)
-        least, most = one.widths
-        width = f"{least / w:.2f}" if most - least < BIN * w else f"{least / w:.2f} to {most / w:.2f}"
-        own = abs(ridge.height[k]) / h, ridge.half_height_width[k] / w
-        ax.set_title(
-            f"points: h {one.height / h:.2f}, w {width}\nregistered: h {own[0]:.2f}, w {own[1]:.2f}",
-            fontsize=10,
-        )
-        ax.grid(alpha=0.3)
+        drawn(ax, found.track, one, found.ridge)
     axes.flat[0].legend(fontsize=8)
-    figure.suptitle(f"{' '.join(line.split())}\nin the read height and width at half height", fontsize=11)
+    figure.suptitle(
+        f"{' '.join(found.line.split())}\nin the read height and width at half height", fontsize=11
+    )
     figure.tight_layout()
     figure.savefig(file, dpi=70)
     plt.close(figure)
 
 
-def told(track: Track, out: Path | None) -> str:
-    """One line for the table; draws the picture."""
+def page(found: list[Found], file: Path) -> None:
+    """A row for each track."""
+    figure, axes = plt.subplots(len(found), A_ROW, figsize=(14, 2.6 * len(found)), squeeze=False)
+    for row, one in zip(axes, found, strict=True):
+        for ax, place in zip(row, spread(one.seen[2:-2], A_ROW), strict=False):
+            drawn(ax, one.track, place, one.ridge)
+        row[0].set_ylabel(one.track.name)
+    axes[0, 0].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(file, dpi=55)
+    plt.close(figure)
+
+
+def told(track: Track, out: Path | None) -> tuple[str, Found | None]:
+    """One line for the table, and what was found; draws the picture."""
     places = np.linspace(0.04, 0.96, PLACES)
     seen = [one for one in (across(track, float(place)) for place in places) if one is not None]
     if not seen:
-        return f"{track.name:34s} no place where both feet and the top are seen"
+        return f"{track.name:34s} no place where both feet and the top are seen", None
     height = np.median([one.height for one in seen]) / track.height
     low, high = np.median([one.widths for one in seen], axis=0) / track.width
     # Flanks that were not seen leave the width open: where both were, it is known.
@@ -203,13 +245,14 @@ def told(track: Track, out: Path | None) -> str:
     try:
         ridge = rf.register(track.points, at=track.seed, kind=track.kind)
     except rf.NoRidgeError as error:
-        return f"{line}; {error}"
+        return f"{line}; {error}", None
     near = [section_in(one, ridge)[0] for one in seen]
-    own = [float(np.median(np.abs(x[near]))) for x in (ridge.height, ridge.half_height_width)]
-    line += f"; registered: h {own[0] / track.height:.2f} w {own[1] / track.width:.2f}"
+    h, w = (float(np.median(np.abs(x[near]))) for x in (ridge.height, ridge.half_height_width))
+    rates = h / track.height, w / track.width
+    found = Found(track, seen, ridge, f"{line}; registered: h {rates[0]:.2f} w {rates[1]:.2f}", rates)
     if out is not None:
-        picture(track, seen, ridge, line, out / f"{track.name.replace(', ', '_').replace(' ', '_')}.png")
-    return line
+        picture(found, out / f"{track.name.replace(', ', '_').replace(' ', '_')}.png")
+    return found.line, found
 
 
 def main() -> None:
@@ -218,6 +261,7 @@ def main() -> None:
     )
     parser.add_argument("scans", type=Path)
     parser.add_argument("--out", type=Path, help="folder for the pictures")
+    parser.add_argument("--page", type=Path, help="picture of the tracks out of the limits")
     parser.add_argument("--only", default="", help="tracks whose name holds this")
     asked = parser.parse_args()
     if not asked.scans.is_dir():
@@ -225,9 +269,14 @@ def main() -> None:
     if asked.out is not None:
         asked.out.mkdir(parents=True, exist_ok=True)
     print("heights and widths at half height in those read")
+    beyond = []
     for track in tracks(asked.scans):
         if asked.only in track.name:
-            print(told(track, asked.out), flush=True)
+            line, found = told(track, asked.out)
+            print(line, flush=True)
+            beyond += [found] if found is not None and found.beyond else []
+    if asked.page is not None and beyond:
+        page(beyond, asked.page)
 
 
 if __name__ == "__main__":

@@ -150,7 +150,7 @@ def fit_whole(
     section may be far off. rounds: at most, of which the last does not change the section any
     more; 0: only how a steep one begins. flat: the base stays as curved across as the path has it. most:
     about as many points are looked at. gentle: begins as if it was not steep.
-    brief: where section and terms stay as they are no other round follows: `known_in_common` is one.
+    brief: where section and terms stay as they are no other round follows: `with_common_errors` is one.
     """
     beside = _beside(path, settings)
     points = points_along(grid, path, (0.5 + beside) * path.width, most)
@@ -183,7 +183,7 @@ def fit_whole(
     return _joint(task, points, state, state.fit, 2.0 * beside)
 
 
-def known_in_common(joint: Joint, settings: Settings, flat: bool) -> Joint | None:
+def with_common_errors(joint: Joint, settings: Settings, flat: bool) -> Joint | None:
     """The same fit to the same points where errors that those beside each other along the ridge have in
     common are looked for; a steep ridge is fitted by its likelihood itself. flat: as for `fit_whole`."""
     task = task_of(_some(joint.points), joint.path, flat)

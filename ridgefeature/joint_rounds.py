@@ -132,7 +132,7 @@ def improved(
     inflation = inflation_of(gain * matrix, gain * goal) if seen_before else state.inflation
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
     if shared:
-        local = _in_common(points, path, state, noise, len(task.some))
+        local = _common_errors(points, path, state, noise, len(task.some))
         known, inflation = gain / np.maximum(inflation, local), max(inflation, float(np.median(local)))
         matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
     else:
@@ -185,8 +185,9 @@ def _by_likelihood(points: Array, state: State) -> tuple[Array, Array]:
     return likelihood_scores(points, state.terms, state.section, *told)
 
 
-def _in_common(points: Array, path: PathFrame, state: State, noise: Noise, fitted: int) -> Array:
-    """Variance of sums over the points of each stretch, by that of independent noise.
+def _common_errors(points: Array, path: PathFrame, state: State, noise: Noise, fitted: int) -> Array:
+    """Variance of sums over the points of each stretch, by that of independent noise: as narrow strips along
+    the ridge tell it, or the scanner's lines, where these have more in common.
 
     fitted: to how many of the points the state was. It follows their errors, which makes sums smaller, and
     is off by them where the others are, which makes sums larger: both by as many coefficients as are free.
@@ -197,7 +198,7 @@ def _in_common(points: Array, path: PathFrame, state: State, noise: Noise, fitte
     followed = _IN_STRIPS * (2.0 - len(points) / fitted) * state.freedom
     found = inflation_along(points, terms, off, shares, scale, followed)
     lines = scan_lines(points, path, shares * np.copysign(far, off))
-    return found if lines is None else np.maximum(found, lines.inflation(path))
+    return found if lines is None else np.maximum(found, lines.inflation)
 
 
 def _by_foot_points(

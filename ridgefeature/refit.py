@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ridgefeature.astray import SHORTEST, as_wide_as_usual, core_of, longest_part
 from ridgefeature.grid import Grid
 from ridgefeature.held_ends import held
-from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole, known_in_common
+from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole, with_common_errors
 from ridgefeature.joint_rounds import is_steep
 from ridgefeature.joint_stations import stations_of, with_section_std
 from ridgefeature.kernels.strip import A, C, E, H, W
@@ -83,7 +83,7 @@ def _as_known(found: Refit, settings: Settings) -> Refit:
     joint = found.joint
     if joint is None:
         return found
-    again = known_in_common(joint, settings, found.flat)
+    again = with_common_errors(joint, settings, found.flat)
     if again is None or not _sound(again):
         again = joint
     elif again.inflation > CORRELATED:

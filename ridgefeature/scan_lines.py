@@ -28,23 +28,15 @@ _ALONG, _ACROSS = 5.0, 0.25
 the terms are smooth, and a line that crosses all of a ridge does not change its height."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScanLines:
     """Lines that have a share of their points' variance in common."""
 
     share: float
     heading: float
     """Direction in radians, by that of the path where it begins, as the base is laid flat along the path."""
-    apart: float
-    """Mean distance of points."""
-
-    def inflation(self, path: PathFrame) -> Array:
-        """Variance of sums over points by that of independent noise, of each stretch (n - 1,)."""
-        headings = _laid_flat(path)[0]
-        slope = np.abs(np.tan(self.heading - 0.5 * (headings[1:] + headings[:-1])))
-        width = 0.5 * (path.width[1:] + path.width[:-1])
-        length = width * _ALONG / np.hypot(1.0, slope * _ALONG / _ACROSS)
-        return np.asarray(1.0 + self.share * length / self.apart)
+    inflation: Array
+    """(n - 1,) variance of sums over the points of each stretch, by that of independent noise."""
 
 
 def scan_lines(points: Array, path: PathFrame, errors: Array) -> ScanLines | None:
@@ -62,7 +54,8 @@ def scan_lines(points: Array, path: PathFrame, errors: Array) -> ScanLines | Non
     seam = np.interp(path.at[-1] - 2.0 * path.overlap, path.at, np.arange(len(path.at)))
     windows = (points[:, 0] / NODES_A_WIDTH).astype(np.int64)
     some = (windows % (1 + len(points) // _ENOUGH) == 0) & (points[:, 0] < seam)
-    places, errors = _flat_places(points[some], path), np.ascontiguousarray(errors[some])
+    flat = _laid_flat(path)
+    places, errors = _flat_places(points[some], *flat), np.ascontiguousarray(errors[some])
 
     def best(angles: Array, part: float) -> tuple[float, float, float]:
         """The surest of directions, the share that is seen in common, its standard deviation."""
@@ -73,7 +66,14 @@ def scan_lines(points: Array, path: PathFrame, errors: Array) -> ScanLines | Non
 
     heading = best(np.arange(_ANGLES) * np.pi / _ANGLES, _SHORT)[0]
     heading, share, std = best(heading + np.linspace(-_NEAR, _NEAR, _AROUND), _LONG)
-    return ScanLines(min(_LOST * share, 1.0), heading, apart) if share > _SURE * std else None
+    if not share > _SURE * std:
+        return None
+    turned = heading - flat[0]
+    slope = np.abs(np.tan(0.5 * (turned[1:] + turned[:-1])))
+    widths = 0.5 * (path.width[1:] + path.width[:-1])
+    length = widths * _ALONG / np.hypot(1.0, slope * _ALONG / _ACROSS)
+    share = min(_LOST * share, 1.0)
+    return ScanLines(share, heading, np.asarray(1.0 + share * length / apart))
 
 
 def _laid_flat(path: PathFrame) -> tuple[Array, Array]:
@@ -86,9 +86,9 @@ def _laid_flat(path: PathFrame) -> tuple[Array, Array]:
     return headings, np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
 
-def _flat_places(points: Array, path: PathFrame) -> Array:
+def _flat_places(points: Array, headings: Array, places: Array) -> Array:
     """(m, 2) where points (m, 3) in path coordinates lie then."""
-    nodes, (headings, places) = np.arange(len(path.at)), _laid_flat(path)
+    nodes = np.arange(len(headings))
     heading, x, y = (np.interp(points[:, 0], nodes, of) for of in (headings, *places.T))
     aside = points[:, 1]
     return np.column_stack([x - aside * np.sin(heading), y + aside * np.cos(heading)])

@@ -57,10 +57,9 @@ def section_std(
     if section.name not in (LEARNED, FREE, box().name):
         return SectionStd(half_height_width=gap, width=gap)
     spans = section.spans
-    inverse = smoothest_section(*told(spans, 1.0), spans, top_knots(section, spans, 1.0) if exact else None)[
-        2
-    ]
-    covariance = inflation * inverse[:-3, :-3]
+    matrix, right = told(spans, 1.0)
+    smooth = smoothest_section(matrix, right, spans, top_knots(section, spans, 1.0) if exact else None)
+    covariance = inflation * smooth[2][:-3, :-3]
     eta = np.linspace(-0.5, 0.5, 2001)
     f = section(eta)
     knots, slope = np.arange(-3.0, spans + 4.0), section(eta, 1)

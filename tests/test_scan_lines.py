@@ -87,7 +87,7 @@ def test_lines_along_a_ridge_tell_least_and_those_across_it_most() -> None:
     path = winding()
     found = scan_lines(*with_path(path, 0.0, 0.3))
     assert found is not None
-    inflation = found.inflation(path)
+    inflation = found.inflation
     assert inflation.shape == (len(path.at) - 1,) and (inflation >= 1).all()
     turned = np.abs(path.tangent[1:, 1])
     assert inflation[turned < 0.1].min() > 3 * inflation[turned > 0.8].max()
