@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from ridgefeature.diagnosis import Diagnosis
     from ridgefeature.ridge import Ridge
 
+_ONE_WAY = 0.5
+"""Length of the mean of unit normals below which no one way is up, as round a pipe."""
+
 
 def number(value: float, digits: int = 4) -> str:
     """So many significant digits, and no exponent for large numbers."""
@@ -27,6 +30,14 @@ def rows(ridge: Ridge, found: Diagnosis) -> list[tuple[str, str]]:
         *ends(ridge),
         ("in doubt", "; ".join(told(found.doubts, unit)) or "no stretch"),
     ]
+
+
+def kind(ridge: Ridge) -> str:
+    """Whether it is a ridge or a groove, and which way is up for that: seen from below it is the other."""
+    mean = ridge.normal.mean(axis=0)
+    size = float(np.linalg.norm(mean))
+    up = " ".join(f"{x + 0.0:g}" for x in np.round(mean / size, 2)) if size > _ONE_WAY else ""
+    return f"{'groove' if ridge.groove else 'ridge'}{f', up is {up}' if up else ''}"
 
 
 def ends(ridge: Ridge) -> list[tuple[str, str]]:

@@ -72,6 +72,11 @@ class Ridge(Stations):
         return float(self.arc_length[-1])
 
     @property
+    def groove(self) -> bool:
+        """Whether it is a groove: its height is below 0 along most of it."""
+        return bool(np.median(self.height) < 0)
+
+    @property
     def _meets_itself(self) -> bool:
         """Whether the last station is the first again: a ring where it was registered, not only on a base."""
         names = ("spine", "tangent", "normal", "height", "width", "border")
@@ -252,6 +257,7 @@ class Ridge(Stations):
         """Figures of the ridge as plain numbers and words, for a table or for JSON."""
         return {
             "unit": self.unit,
+            "groove": self.groove,
             "length": self.length,
             "templates": len(self.templates),
             "height_min": float(self.height.min()),

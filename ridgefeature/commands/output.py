@@ -7,7 +7,7 @@ from typing import Any
 
 from ridgefeature.commands.console import one_line, point, print_table
 from ridgefeature.diagnosis import Diagnosis
-from ridgefeature.readable import ends, number
+from ridgefeature.readable import ends, kind, number
 from ridgefeature.readable import rows as trust
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
@@ -60,6 +60,7 @@ def rows(ridge: Ridge, found: Diagnosis | None = None) -> list[tuple[str, str]]:
     """The summary for people; with what its scan tells of it, if that is there."""
     figures, unit = ridge.summary(), ridge.unit
     return [
+        ("kind", kind(ridge)),
         ("length", f"{number(ridge.length)} {unit}{', a ring' if ridge.closed else ''}"),
         ("templates", str(len(ridge.templates))),
         ("height h", _span(ridge.height, unit, ridge.height_std)),
@@ -81,7 +82,8 @@ def rows(ridge: Ridge, found: Diagnosis | None = None) -> list[tuple[str, str]]:
 
 def show(ridge: Ridge, files: dict[str, str], found: Diagnosis) -> None:
     """Print the summary and the files written."""
-    name = "ridge" if ridge.source is None else f"ridge in {ridge.source.name}"
+    what = "groove" if ridge.groove else "ridge"
+    name = what if ridge.source is None else f"{what} in {ridge.source.name}"
     print_table(name, [*rows(ridge, found), *((f"wrote {kind}", path) for kind, path in files.items())])
 
 

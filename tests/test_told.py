@@ -1,0 +1,42 @@
+"""What the summary of a ridge tells its reader, at the command line and as figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracles import spiral_ridge
+
+import ridgefeature as rf
+from ridgefeature.commands import output
+
+
+@pytest.fixture(scope="module")
+def ridge() -> rf.Ridge:
+    return spiral_ridge()
+
+
+def told(ridge: rf.Ridge) -> dict[str, str]:
+    return dict(output.rows(ridge))
+
+
+def test_a_groove_is_called_one_and_a_ridge_too(ridge: rf.Ridge) -> None:
+    groove = ridge.resized(h=-1)
+    assert (ridge.groove, groove.groove) == (False, True)
+    assert (ridge.summary()["groove"], groove.summary()["groove"]) == (False, True)
+    assert told(ridge)["kind"] == "ridge, up is 0 0 1"
+    assert told(groove)["kind"] == "groove, up is 0 0 1"
+
+
+def test_which_way_is_up_tells_a_ridge_from_a_groove_seen_from_below(ridge: rf.Ridge) -> None:
+    below = replace(ridge, normal=-ridge.normal)
+    assert told(below)["kind"] == "ridge, up is 0 0 -1"
+    round_a_pipe = np.where(np.arange(len(ridge.normal))[:, None] % 2, ridge.normal, -ridge.normal)
+    assert told(replace(ridge, normal=round_a_pipe))["kind"] == "ridge"
+
+
+def test_the_title_says_groove(ridge: rf.Ridge, capsys: pytest.CaptureFixture[str]) -> None:
+    found = rf.diagnose(ridge, ridge.surface().grid(200, 40).reshape(-1, 3))
+    output.show(ridge.resized(h=-1), {}, found)
+    assert capsys.readouterr().out.startswith("groove")
