@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ridgefeature.curvilinear import templates_on
+
 if TYPE_CHECKING:
     from ridgefeature.diagnosis import Diagnosis
     from ridgefeature.ridge import Ridge
@@ -38,6 +40,12 @@ def kind(ridge: Ridge) -> str:
     size = float(np.linalg.norm(mean))
     up = " ".join(f"{x + 0.0:g}" for x in np.round(mean / size, 2)) if size > _ONE_WAY else ""
     return f"{'groove' if ridge.groove else 'ridge'}{f', up is {up}' if up else ''}"
+
+
+def templates(ridge: Ridge) -> str:
+    """How many templates the march fitted, and how many of them are part of the finished ridge."""
+    fitted, on = len(ridge.templates), len(templates_on(ridge)[0])
+    return f"{fitted}" if on == fitted else f"{fitted}, {on} of them on the finished ridge"
 
 
 def ends(ridge: Ridge) -> list[tuple[str, str]]:

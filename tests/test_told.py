@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from oracles import spiral_ridge
 
 import ridgefeature as rf
+from ridgefeature import plot
 from ridgefeature.commands import output
+from ridgefeature.curvilinear import templates_on
 
 
 @pytest.fixture(scope="module")
@@ -40,3 +43,14 @@ def test_the_title_says_groove(ridge: rf.Ridge, capsys: pytest.CaptureFixture[st
     found = rf.diagnose(ridge, ridge.surface().grid(200, 40).reshape(-1, 3))
     output.show(ridge.resized(h=-1), {}, found)
     assert capsys.readouterr().out.startswith("groove")
+
+
+def test_table_and_picture_count_the_same_templates(ridge: rf.Ridge, tmp_path: Path) -> None:
+    whole, short = len(ridge.templates), ridge.stretched(0.5 * ridge.length, "trim")
+    on = len(templates_on(short)[0])
+    assert on < whole
+    assert told(ridge)["templates"] == f"{whole}"
+    assert told(short)["templates"] == f"{whole}, {on} of them on the finished ridge"
+    for one, said in ((ridge, f" {whole} templates"), (short, f" {on} of {whole} templates")):
+        figure = plot.view(one.surface().grid(100, 20).reshape(-1, 3), one, tmp_path / "view.png")
+        assert any(said in text.get_text() for text in figure.texts)

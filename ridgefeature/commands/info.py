@@ -106,7 +106,7 @@ def _step(file: Path) -> Found:
     rows += [
         (
             f"carries {one['name']}",
-            f"{number(one['length'])} {one['unit']} long, {one['templates']} templates, "
+            f"{number(one['length'])} {one['unit']} long, {one['templates']} templates fitted, "
             f"h {number(one['h'])}, w {number(one['w'])}{', pasted' if one['pasted'] else ''}",
         )
         for one in carried

@@ -7,7 +7,7 @@ from typing import Any
 
 from ridgefeature.commands.console import one_line, point, print_table
 from ridgefeature.diagnosis import Diagnosis
-from ridgefeature.readable import ends, kind, number
+from ridgefeature.readable import ends, kind, number, templates
 from ridgefeature.readable import rows as trust
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
@@ -62,7 +62,7 @@ def rows(ridge: Ridge, found: Diagnosis | None = None) -> list[tuple[str, str]]:
     return [
         ("kind", kind(ridge)),
         ("length", f"{number(ridge.length)} {unit}{', a ring' if ridge.closed else ''}"),
-        ("templates", str(len(ridge.templates))),
+        ("templates", templates(ridge)),
         ("height h", _span(ridge.height, unit, ridge.height_std)),
         ("width w, foot to foot", _span(ridge.width, unit, ridge.width_std)),
         ("width at half height", _span(ridge.half_height_width, unit)),

@@ -257,8 +257,9 @@ def _figures(ridge: Ridge) -> str:
         low, high = number(values.min(), 3), number(values.max(), 3)
         return f"{low if low == high else f'{low} to {high}'} {ridge.unit}"
 
-    count = len(templates_on(ridge)[0])
+    fitted, on = len(ridge.templates), len(templates_on(ridge)[0])
+    count = f"{on} of {fitted}" if on < fitted else f"{fitted}"
     return (
         f"{number(ridge.length)} {ridge.unit} long, {span(ridge.height)} high, {span(ridge.width)} wide, "
-        f"{count} template{'s' if count != 1 else ''}"
+        f"{count} template{'s' if fitted != 1 else ''}"
     )
