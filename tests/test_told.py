@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cli_helpers import run
 from oracles import spiral_ridge
 
 import ridgefeature as rf
@@ -54,3 +56,16 @@ def test_table_and_picture_count_the_same_templates(ridge: rf.Ridge, tmp_path: P
     for one, said in ((ridge, f" {whole} templates"), (short, f" {on} of {whole} templates")):
         figure = plot.view(one.surface().grid(100, 20).reshape(-1, 3), one, tmp_path / "view.png")
         assert any(said in text.get_text() for text in figure.texts)
+
+
+def test_info_says_where_the_unit_is_assumed(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).normal(size=(50, 3))
+    np.save(tmp_path / "a.npy", points)
+    assumed = "mm, assumed: such files are read without one; --unit gives another"
+    assert assumed in run("info", tmp_path / "a.npy").stdout
+    assert json.loads(run("info", tmp_path / "a.npy", "--json").stdout)["unit_assumed"] is True
+    given = run("info", tmp_path / "a.npy", "--unit", "mm")
+    assert "mm" in given.stdout and "assumed" not in given.stdout
+    assert (
+        json.loads(run("info", tmp_path / "a.npy", "--unit", "cm", "--json").stdout)["unit_assumed"] is False
+    )

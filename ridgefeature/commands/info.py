@@ -13,6 +13,7 @@ from ridgefeature.readable import number
 from ridgefeature.settings import Settings
 
 Found = tuple[str, list[tuple[str, str]], dict[str, Any]]
+_ASSUMED = ", assumed: such files are read without one; --unit gives another"
 
 
 def run(file: Path, unit: str | None, as_json: bool) -> None:
@@ -54,12 +55,14 @@ def _scan(file: Path, unit: str | None) -> Found:
     from ridgefeature.io.read import FORMATS, read_scan
 
     scan = read_scan(file, unit=unit)
+    form = FORMATS[file.suffix.lower()]
+    assumed = unit is None and form.unit is None
     low, high = scan.bounds
     spacing = typical_spacing(build_grid(scan.points))
     middle = scan.points[((scan.points - 0.5 * (low + high)) ** 2).sum(axis=1).argmin()]
     rows = [
         ("points", f"{len(scan):,}"),
-        ("unit", scan.unit),
+        ("unit", f"{scan.unit}{_ASSUMED if assumed else ''}"),
         ("lowest x y z", point(low)),
         ("highest x y z", point(high)),
         ("size", f"{' x '.join(number(x) for x in high - low)} {scan.unit}"),
@@ -70,11 +73,12 @@ def _scan(file: Path, unit: str | None) -> Found:
         "kind": "scan",
         "points": len(scan),
         "unit": scan.unit,
+        "unit_assumed": assumed,
         "low": low.tolist(),
         "high": high.tolist(),
         "spacing": float(spacing),
     }
-    return f"{FORMATS[file.suffix.lower()].title}, read as a scan", rows, document
+    return f"{form.title}, read as a scan", rows, document
 
 
 def _step(file: Path) -> Found:
