@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.settings import Settings
 from ridgefeature.starts import Hints
 
+if TYPE_CHECKING:
+    from ridgefeature.ridge import Ridge
+
 Array = NDArray[np.float64]
+_OFF = 60.0
+"""Degrees between a given direction and the ridge at the pick from which on they do not agree."""
 KINDS = ("ridge", "groove", "auto")
 
 
@@ -45,6 +52,32 @@ def hints_of(direction: ArrayLike | None, width: float | None, height: float | N
         None if height is None else positive(height, "height"),
         kind,
     )
+
+
+def warned(ridge: Ridge, pick: Array, direction: ArrayLike | None) -> Ridge:
+    """The ridge; with a UserWarning where it does not run along the direction that was given."""
+    if direction is None:
+        return ridge
+    given = vector_of(direction, "direction")
+    tangent = ridge.tangent[int(np.argmin(np.linalg.norm(ridge.spine - pick, axis=1)))]
+    off = math.degrees(math.acos(min(abs(float(tangent @ given)) / float(np.linalg.norm(given)), 1.0)))
+    if off > _OFF:
+        warnings.warn(
+            f"direction: expected one along the ridge, got {text_of(given)}; the ridge found runs along "
+            f"{text_of(np.round(tangent, 3) + 0.0)} at the pick, {off:.0f} degrees off. See whether it is "
+            "the one that is meant; then give its own direction= or leave it out, else pick elsewhere",
+            UserWarning,
+            stacklevel=3,
+        )
+    return ridge
+
+
+def refusal(message: str, hints: Hints) -> str:
+    """Why there is no ridge; and along which direction it was looked for, if one was given."""
+    if hints.direction is None:
+        return message
+    along = text_of(hints.direction)
+    return f"{message}; it was looked for along {along}: leave direction= out to look all round"
 
 
 def positive(value: Any, name: str, whole: bool = False) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.alternatives import distinct
-from ridgefeature.asked import hints_of, positive, settings_of, text_of, vector_of
+from ridgefeature.asked import hints_of, positive, refusal, settings_of, text_of, vector_of, warned
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
@@ -92,7 +92,7 @@ def register(
     _check_pick(grid, pick, spacing, extent)
     full = Window(grid, spacing)
     rough = full.thinned(_ROUGH_POINTS)
-    return _tried(rough, full, pick, extent, hints, settings, progress, scan)
+    return warned(_tried(rough, full, pick, extent, hints, settings, progress, scan), pick, direction)
 
 
 def _constructed(
@@ -158,7 +158,7 @@ def _tried(
     with suppress(NoRidgeError):
         return tried(extent, high=True)
     if not isinstance(refused, _RefusedError) or hints.width is not None:
-        raise NoRidgeError(str(refused)) from None
+        raise NoRidgeError(refusal(str(refused), hints)) from None
     if refused.too_large:
         for n in range(_NARROWER):
             with suppress(NoRidgeError):
@@ -167,7 +167,7 @@ def _tried(
         hints = replace(hints, width=refused.width * LADDER**step)
         with suppress(NoRidgeError):
             return tried(extent)
-    raise NoRidgeError(str(refused)) from None
+    raise NoRidgeError(refusal(str(refused), hints)) from None
 
 
 def _track(

@@ -25,7 +25,7 @@ class Program(click.Group):
             if not sys.warnoptions:
                 warnings.simplefilter("ignore")
                 warnings.filterwarnings("always", category=UserWarning)
-            warnings.showwarning = _show_warning
+            warnings.showwarning = self._show_warning
             sys.exit(self._status(*args, **options))
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -53,8 +53,14 @@ class Program(click.Group):
             from ridgefeature import NoRidgeError
 
             status = NO_RIDGE if isinstance(error, NoRidgeError) else BAD_INPUT
-            return fail(in_options(str(error), {str(o.name) for _, o in self._options()}), status)
+            return fail(self._in_options(str(error)), status)
         return result if isinstance(result, int) else 0
+
+    def _in_options(self, message: str) -> str:
+        return in_options(message, {str(o.name) for _, o in self._options()})
+
+    def _show_warning(self, message: Warning | str, *_: Any, **__: Any) -> None:
+        click.echo(f"ridgefeature: warning: {one_line(self._in_options(str(message)))}", err=True)
 
     def _options(self) -> list[tuple[str, click.Option]]:
         """The options of all commands, with the command of each."""
@@ -145,7 +151,3 @@ def _reason(error: OSError) -> str:
     if error.strerror and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     return str(error)
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    click.echo(f"ridgefeature: warning: {one_line(str(message))}", err=True)
