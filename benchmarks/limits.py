@@ -82,7 +82,7 @@ def show(name: str, points: Array, height: float, length: float) -> None:
 def main() -> None:
     print("| case | length found [%] | error of h [%] | error of the width at half height [%] | section |")
     print("|---|---|---|---|---|")
-    for rate in (0.2, 0.6, 1.0, 1.2, 1.5, 2.0):
+    for rate in (0.2, 0.6, 1.0, 1.5, 2.0, 2.5, 3.0):
         eta = np.linspace(-0.5, 0.5, 1001)
         steepest = np.degrees(np.arctan(rate * bell()(eta, 1).max()))
         height = rate * WIDTH

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ridgefeature as rf
-from ridgefeature.section import box
+from ridgefeature.section import bell, box
 
 WIDTH, HEIGHT = 8.0, 14.0
 
@@ -40,6 +40,20 @@ def test_a_wall_is_found_from_any_place_on_it(strays):
         assert np.abs(ridge.height[inner] / HEIGHT - 1.0).max() < 0.05
         assert np.abs((ridge.spine @ turn)[inner, 1]).max() < 0.2
         assert np.median(np.abs(ridge.tangent @ turn)[:, 0]) > 0.999
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.4])
+def test_a_bell_twice_as_high_as_wide_is_found_from_the_pick_alone(noise):
+    random = np.random.default_rng(0)
+    x, y = random.uniform(-40, 40, 40_000), random.uniform(-30, 30, 40_000)
+    points = np.column_stack([x, y, 20.0 * bell()(y / 10.0)]) + random.normal(0.0, noise, (40_000, 3))
+    for click in ((0, 0, 20), (15, 0.5, 18)):
+        ridge = rf.register(points, at=click)
+        assert ridge.length == pytest.approx(80, abs=3)
+        middle = np.abs(ridge.arc_length - 40) < 20
+        assert np.median(ridge.height[middle]) == pytest.approx(20, rel=0.01)
+        usual = 10 * bell().half_height_width
+        assert np.median(ridge.half_height_width[middle]) == pytest.approx(usual, rel=0.01)
 
 
 def test_a_hinted_direction_and_width_are_kept_to():
