@@ -106,5 +106,7 @@ def topods(shape: Any) -> TopoDS_Shape:
     """The TopoDS_Shape itself or in `.wrapped`; ValueError when there is none or it is null."""
     wrapped = getattr(shape, "wrapped", shape)
     if not isinstance(wrapped, TopoDS_Shape) or wrapped.IsNull():
-        raise ValueError(f"expected a CAD shape, got {type(shape).__name__} without one; make a shape first")
+        raise ValueError(
+            f"expected a CAD shape, got {type(shape).__name__}; give one of CadQuery, build123d or OCCT"
+        )
     return wrapped

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import cadquery as cq
 import numpy as np
 from numpy.typing import ArrayLike
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
-from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.gp import gp_Pnt
-from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from cad_export.carried import carried_by, faces_of, record_of
-from cad_export.check import subshapes
-from cad_export.face_base import FaceBase, face_base, vector
+from cad_export.carried import record_of
+from cad_export.face_base import FaceBase, face_base
 from cad_export.geometry import topods
 from cad_export.headroom import check_height
-from cad_export.inset import face_of, inset_at
+from cad_export.host_face import chosen_face, solid_of
+from cad_export.inset import InsetReport, inset_at
 from cad_export.paste_history import Placement, remember
+from cad_export.room import told_if_too_small
 from cad_export.site import Site
 from cad_export.strip import OffFaceError
 from ridgefeature.fitting import FITS
@@ -54,12 +51,13 @@ def paste(
     """The host solid with the ridge grown out of a face; a negative h engraves.
 
     host: a cq.Solid, a Workplane with one, or anything whose `.wrapped` is a TopoDS_Shape with one solid, in
-    millimetres; it is not changed. face: one of its faces; left out, the one nearest to `at` or `path`, or
-    its largest. The ridge's own shape is developed onto the face, its bends kept as geodesic curvature: its
-    middle comes to `at` (3,), by default the middle of the face, along `direction` (3,). Or it follows
-    `path`, an edge or wire on the face; fit tells whether its profile is then stretched ("length"), scaled as
-    a whole ("scale") or cut ("trim"). A closed edge makes a ring. h, w: rates. scale: of the whole ridge.
-    mirror: left and right changed; reverse: start and end.
+    millimetres; it is not changed. face: one of its faces, a selector of one such as ">Z", or a Workplane on
+    which one is selected; left out, the one nearest to `at` or `path`, or its largest. The ridge's own shape
+    is developed onto the face, its bends kept as geodesic curvature: its middle comes to `at` (3,), by
+    default the middle of the face, along `direction` (3,). Or it follows `path`, an edge or wire on the face;
+    fit tells whether its profile is then stretched ("length"), scaled as a whole ("scale") or cut ("trim"). A
+    closed edge makes a ring. h, w: rates. scale: of the whole ridge. mirror: left and right changed; reverse:
+    start and end.
 
     The result has passed a fast certificate: one closed solid, its volume against the surface's own integral,
     edge tolerances, the footprint inside the face; check=True adds OCCT's search for self-intersections and a
@@ -69,25 +67,34 @@ def paste(
     if fit not in FITS:
         raise ValueError(f"fit: expected one of {', '.join(FITS)}, got {fit!r}; choose one")
     check_rates(h=h, w=w)
-    solid = _solid_of(host)
-    chosen = face_of(solid, _face_of(solid, face, path, at))
-    where = (_checked(ridge), chosen, path, at, direction, fit, scale, mirror, reverse, w)
-    try:
-        stand = _stand(*where)
-        site = _site(solid, stand, h, w)
-        result, grown, told = inset_at(solid, site, h, check)
-    except OffFaceError as error:
-        with _instead(error):  # other faces may go on from this one
-            stand = _stand(*where, beyond=True)
-        site = _site(solid, stand, h, w)  # what it says of h and w holds on any face
-        with _instead(error):
-            result, grown, told = inset_at(solid, site, h, check)
+    solid, size = solid_of(host), _in_millimetres(_checked(ridge), scale)
+    chosen = chosen_face(solid, face, path, at, size)
+    by = "face" if face is not None else "host" if at is None else "at"
+    lay = partial(_stand, ridge, chosen, path, at, direction, fit, scale, mirror, reverse, w)
+    with told_if_too_small(solid, chosen, size if path is None else None, by):
+        stand, result, grown, told = _pasted(solid, lay, h, w, check)
     if report is not None:
         report.update(asdict(told))
     options = {"fit": fit, "scale": scale, "mirror": mirror, "reverse": reverse}
     place = Placement(stand.middle, at, direction, path, options, told.volume_added)
     remember(solid, result, grown, record_of(ridge, h, w, name), place)
     return cq.Solid(result)
+
+
+def _pasted(
+    solid: TopoDS_Shape, lay: Callable[..., _Stand], h: float, w: float, check: bool
+) -> tuple[_Stand, TopoDS_Solid, TopoDS_Face, InsetReport]:
+    """The stand, and what inset_at gives there; lay: lays the ridge on its face, or beyond it."""
+    try:
+        stand = lay()
+        site = _site(solid, stand, h, w)
+        return stand, *inset_at(solid, site, h, check)
+    except OffFaceError as error:
+        with _instead(error):  # other faces may go on from this one
+            stand = lay(beyond=True)
+        site = _site(solid, stand, h, w)  # what it says of h and w holds on any face
+        with _instead(error):
+            return stand, *inset_at(solid, site, h, check)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,46 +222,3 @@ def _in_millimetres(ridge: Ridge, scale: float) -> Ridge:
     stds = ("height_std", "width_std", "half_height_width_std", "spine_std")
     scaled = {name: factor * getattr(ridge, name) for name in lengths + stds}
     return replace(ridge, unit="mm", curvature=ridge.curvature / factor, end_interval=None, **scaled)
-
-
-def _solid_of(host: Any) -> TopoDS_Shape:
-    """The only solid in a shape or on a Workplane's stack."""
-    shapes = host.vals() if hasattr(host, "vals") else [host]
-    solids = [solid for shape in shapes for solid in subshapes(topods(shape), TopAbs_SOLID)]
-    if len(solids) != 1:
-        raise ValueError(f"host: expected one solid, got {len(solids)}; make one, or choose one of them")
-    return solids[0]
-
-
-def _face_of(solid: TopoDS_Shape, face: Any, path: Any, at: ArrayLike | None) -> TopoDS_Face:
-    """The given face; else the one nearest to the place or path, else the largest."""
-    if face is not None:
-        shape = topods(face)
-        if shape.ShapeType() != TopAbs_FACE:
-            raise ValueError(f"face: expected a face, got {type(face).__name__}; select one face of the host")
-        return TopoDS.Face_s(shape)
-    faces = faces_of(solid)
-    if path is not None or at is not None:
-        goal = _vertex(at) if path is None else topods(path)
-        nearest = min(faces, key=lambda f: BRepExtrema_DistShapeShape(goal, f).Value())
-        _check_free(solid, nearest, "at" if path is None else "path")
-        return nearest
-    areas = [cq.Face(f).Area() for f in faces]
-    largest = max(areas)
-    if sum(a > (1 - 1e-6) * largest for a in areas) > 1:
-        raise ValueError("face: the host has several largest faces; give face=, at= or path=")
-    return faces[areas.index(largest)]
-
-
-def _check_free(solid: TopoDS_Shape, face: TopoDS_Face, place: str) -> None:
-    """Raise ValueError where the face that was found is that of a ridge: nobody asked for a ridge on it."""
-    for other, record in carried_by(solid):
-        if other.IsSame(face):
-            raise ValueError(
-                f"{place}: expected a place clear of ridges pasted before, {record.name!r} is there; give "
-                "another place, face= to set this ridge on that one, or paste on the host as it was before"
-            )
-
-
-def _vertex(at: ArrayLike | None) -> TopoDS_Shape:
-    return BRepBuilderAPI_MakeVertex(gp_Pnt(*vector(at, "at").tolist())).Vertex()

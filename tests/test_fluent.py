@@ -53,7 +53,7 @@ def test_points_edges_and_bare_workplanes_serve_as_places(ridge):
     top = host().faces(">Z").workplane()
     for places in (top, top.pushPoints([(5, 5)]), host().faces(">Z").vertices("<X and <Y")):
         if places.vals() and isinstance(places.val(), cq.Vertex):
-            with pytest.raises(ValueError, match="leaves"):
+            with pytest.raises(ValueError, match="at: expected a face with room"):
                 places.pasteRidge(ridge, check=False)
         else:
             assert places.pasteRidge(ridge, check=False).solids().size() == 1

@@ -138,7 +138,7 @@ def test_the_part_can_be_worked_on(ridge, box, top):
         ({"at": (0, 0)}, "at: expected three"),
         ({"at": (np.nan, 0, 0)}, "at"),
         ({"scale": 0}, "scale: expected"),
-        ({"scale": 9}, "leaves"),
+        ({"scale": 9}, "too small"),
         ({"fit": "no"}, "fit"),
         ({"direction": (0, 0, 0)}, "direction"),
         ({"direction": (0, 0, 1)}, "direction"),
