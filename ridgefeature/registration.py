@@ -12,6 +12,7 @@ from ridgefeature.alternatives import distinct
 from ridgefeature.asked import hints_of, positive, refusal, settings_of, text_of, vector_of, warned
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
+from ridgefeature.follows import told_ends
 from ridgefeature.grid import Grid, build_grid, nearest, nearest_distance, nearest_distances, typical_spacing
 from ridgefeature.guess import guess
 from ridgefeature.improve import sample
@@ -121,7 +122,7 @@ def _constructed(
         **vars(stations),
         section=section,
         templates=_with_distances(track.templates, grid),
-        stop=stop,
+        stop=told_ends(full.grid, stations, stop),
         closed=closed,
         end_interval=intervals,
         unit=scan.unit,
