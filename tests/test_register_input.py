@@ -202,15 +202,16 @@ def test_any_points_give_a_ridge_or_a_value_error(seed, kind):
     assert np.isfinite(found.surface().poles).all()
 
 
-def test_a_groove_is_never_found_as_a_ridge_nor_a_ridge_as_a_groove():
+@pytest.mark.parametrize("kind", ["ridge", "groove"])
+@pytest.mark.parametrize("first", [1200, 1240, 1280])
+def test_a_groove_is_never_found_as_a_ridge_nor_a_ridge_as_a_groove(first, kind):
     wrong = []
-    for seed in range(1200, 1320):
+    for seed in range(first, first + 40):
         points = cloud(seed)
-        for kind in ("ridge", "groove"):
-            try:
-                found = rf.register(points, points[seed % len(points)], kind=kind, max_templates=3)
-            except ValueError:
-                continue
-            if ((found.height < 0) != (kind == "groove")).any():
-                wrong.append((seed, kind, float(found.height.min())))
+        try:
+            found = rf.register(points, points[seed % len(points)], kind=kind, max_templates=3)
+        except ValueError:
+            continue
+        if ((found.height < 0) != (kind == "groove")).any():
+            wrong.append((seed, float(found.height.min())))
     assert wrong == []
