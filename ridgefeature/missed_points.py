@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.kernels.agreement import agreed_heights
 from ridgefeature.kernels.strip import A, B, H, W, places_across
 from ridgefeature.noise import Noise
 from ridgefeature.path_frame import NODES_A_WIDTH
@@ -82,21 +83,6 @@ def _connected(any_height: Flags, known: Flags) -> Flags:
 
 
 def _found(place: Array, own: Array, known: Array, off: float, near: float) -> Array:
-    """Heights (n,) at the nodes that most points agree with, where few do with the known ones (n,); else NaN.
-
-    place (m,): of points among the nodes; own (m,): their heights; off, near: how far one that agrees may be
-    from what is known, and from what is found.
-    """
-    nodes, reach = len(known), NODES_A_WIDTH // 4
-    agrees = np.abs(own - np.interp(place, np.arange(nodes), known)) < off
-    nearest = (place + 0.5).astype(np.int64)
-    told = np.stack([np.bincount(nearest, weights, nodes) for weights in (None, agrees)]).astype(np.float64)
-    sums = np.cumsum(np.pad(told, ((0, 0), (reach + 1, reach))), axis=1)
-    count, agree = sums[:, 2 * reach + 1 :] - sums[:, : -2 * reach - 1]
-    out = np.full(nodes, np.nan)
-    for k in np.flatnonzero((count >= _FEWEST) & (agree < _MOST * count)):
-        heights = own[np.abs(nearest - k) <= reach]
-        height = float(np.median(heights))
-        if (np.abs(heights - height) < near).sum() > max(agree[k], _MOST * count[k]):
-            out[k] = height
-    return out
+    """As kernels.agreement has it, of points half a width about each node."""
+    place, own = np.ascontiguousarray(place), np.ascontiguousarray(own)
+    return agreed_heights(place, own, known, off, near, NODES_A_WIDTH // 4, _FEWEST, _MOST)

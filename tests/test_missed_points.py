@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ridgefeature.grid import build_grid
+from ridgefeature.kernels.agreement import agreed_heights
 from ridgefeature.kernels.strip import TERMS, A, B, H, W
 from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise
@@ -119,3 +120,24 @@ def test_a_ridge_is_followed_to_its_end_at_low_noise_from_far_before():
     found = refitted(grid, known, bell(), False, (True, True), Settings()).stations
     assert found.spine[-1, 0] == pytest.approx(length, abs=0.1 * WIDTH)
     assert found.height == pytest.approx(HEIGHT, rel=0.02)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.9])
+def test_agreed_heights_are_those_of_a_search_about_every_node(share):
+    random = np.random.default_rng(7)
+    known, places = random.uniform(2, 3, NODES), random.uniform(0, NODES - 1, 900)
+    heights = np.interp(places, np.arange(NODES), known) + random.normal(0, 0.1, 900)
+    off, near = 0.3, 0.4
+    other = random.random(900) < share
+    heights[other] = random.normal(5, 0.2, other.sum())
+    found = agreed_heights(places, heights, known, off, near, 2, 6, 0.5)
+    agrees = np.abs(heights - np.interp(places, np.arange(NODES), known)) < off
+    for k in range(NODES):
+        about = np.abs((places + 0.5).astype(int) - k) <= 2
+        median = np.median(heights[about])
+        told = (np.abs(heights[about] - median) < near).sum()
+        few = agrees[about].sum() < 0.5 * about.sum()
+        good = about.sum() >= 6 and few and told > max(agrees[about].sum(), 0.5 * about.sum())
+        assert found[k] == (pytest.approx(median, rel=1e-12) if good else pytest.approx(np.nan, nan_ok=True))
+    assert np.isfinite(found).any() == (share > 0.5)
+    assert np.isnan(agreed_heights(places[:0], heights[:0], known, off, near, 2, 6, 0.5)).all()
