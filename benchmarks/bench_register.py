@@ -206,7 +206,7 @@ def main() -> None:
     large = "--large" in sys.argv
     report = Report()
     register_spiral(SPIRAL.points(20_000))
-    speed(report, 100_000, 1.0, 9)
+    speed(report, 100_000, 3.0, 31)
     speed(report, 1_000_000, 0.25, 3)
     if large:
         speed(report, 10_000_000, 0.15, 3)
