@@ -34,7 +34,8 @@ _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 _HIGH = 0.9
 """Height above which knots are on the top."""
 _TWO_HUMPS = 0.05
-"""Twice the log likelihood ratio, by points, beyond which a section has more than one hump."""
+"""Twice the log likelihood ratio, by points, beyond which points deny that there is one hump: then what is
+off is not the section, but noise, height or width, and none is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,10 @@ def free_section(
     if not found[3:-6].max() > 0:
         return None
     cost = 0.5 * price * freedom
-    found, shift, part = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * count, cost))
+    humped = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * count, cost))
+    if humped is None:
+        return None
+    found, shift, part = humped
     if not np.convolve(found[3:-6], _AT_KNOT).max() > 0:
         return None
     gain = _gain(matrix, right, found, section, spans, wider)
@@ -126,8 +130,10 @@ def trimmed(section: Section) -> tuple[Section, float, float]:
     middle, breadth = 0.5 * (low + high), high - low
     own, spans = np.linspace(-0.5, 0.5, 401), max(round(section.spans * breadth), _LEAST_SPANS)
     basis = basis_matrix(np.arange(-3.0, spans + 4.0), 3, (own + 0.5) * spans)[:, 3:-3]
-    raised = np.linalg.lstsq(basis, section(middle + breadth * own), rcond=None)[0]
-    return Section(np.asarray(raised, dtype=np.float64), LEARNED), middle, breadth
+    raised = np.asarray(np.linalg.lstsq(basis, section(middle + breadth * own), rcond=None)[0])
+    # At vertical flanks the nearest spline would swing.
+    raised = one_hump(raised, np.asarray(np.linalg.qr(basis)[1]))[0]
+    return Section(raised, LEARNED), middle, breadth
 
 
 def top_knots(section: Section, spans: int, wider: float) -> NDArray[np.bool_]:
@@ -172,8 +178,9 @@ def smoothest_section(
 
 def _humped(
     found: Array, inverse: Array, spans: int, price: float, most: float
-) -> tuple[Array, float, float]:
-    """The coefficients that rise to an apex and fall from it, symmetric unless that costs too much.
+) -> tuple[Array, float, float] | None:
+    """The coefficients that rise to an apex and fall from it, symmetric unless that costs too much; None
+    where any such do.
 
     found, inverse: coefficients without this condition, and their covariance; price: what a symmetric one may
     cost, most: what one hump may, in twice the log likelihood ratio. Noise makes bumps, and the highest would
@@ -191,7 +198,7 @@ def _humped(
         if cost - least > price or cost > most:
             one, shift, cost, part = free, 0.0, least, 1.0
     if cost > most or not one.max() > 0:
-        return found, 0.0, 1.0
+        return None
     out = found.copy()
     out[3:spans] = one
     rest = np.r_[spans + 3 : len(found)]

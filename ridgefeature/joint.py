@@ -51,6 +51,9 @@ _LEAST_NOISE = 0.02
 """Distance of points, in heights, that a section may always miss by."""
 _GIRTH = 41
 """Places of a section that tell its length."""
+_COARSE = 2.0
+"""Distances of points from a steep ridge, by the noise beside it, from which on its flanks are steeper than
+any section: the likeliest one would have horns."""
 _MOVED = 0.02
 """Largest change of terms by a round, in heights and widths, up to which it may be the last but one."""
 _FEWEST = 60
@@ -185,10 +188,11 @@ def fit_whole(
 
 def with_common_errors(joint: Joint, settings: Settings, flat: bool) -> Joint | None:
     """The same fit to the same points where errors that those beside each other along the ridge have in
-    common are looked for; a steep ridge is fitted by its likelihood itself. flat: as for `fit_whole`."""
+    common are looked for; a steep ridge is fitted by its likelihood itself, unless its flanks are steeper
+    than a section can be. flat: as for `fit_whole`."""
     task = task_of(_some(joint.points), joint.path, flat)
     state: State | None = _lying_as_told(task, _begun(task, joint.section, joint))
-    if state is not None and task.steep:
+    if state is not None and task.steep and state.noise.scale < _COARSE * state.noise.blur:
         state = likelier(task, joint.points, state, settings.section in FOUND)
     else:
         state = improved(task, joint.points, state, 0, shared=True)

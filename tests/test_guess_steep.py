@@ -70,3 +70,24 @@ def test_the_edge_of_a_step_is_no_wall(kind):
     for click in ((0, 3.6, 7.0), (5, 3.0, HEIGHT), (9, 4.0, 1.0)):
         with pytest.raises(rf.NoRidgeError):
             rf.register(step, at=click, kind=kind)
+
+
+def tube(seed: int, height: float, width: float = 6.0, noise: float = 0.03) -> np.ndarray:
+    """40 000 points spread evenly over a ridge along x with a flat top and vertical walls, and its ground."""
+    random, ground = np.random.default_rng(seed), 20 - width / 2
+    t, x = random.uniform(0, 2 * (ground + height) + width, 40_000), random.uniform(-60, 60, 40_000)
+    corners = np.cumsum([0.0, ground, height, width, height, ground])
+    y = np.interp(t, corners, [-20, -width / 2, -width / 2, width / 2, width / 2, 20])
+    z = np.interp(t, corners, [0, 0, height, height, 0, 0])
+    return np.column_stack([x, y, z]) + random.normal(0, noise, (40_000, 3))
+
+
+@pytest.mark.parametrize(("height", "seed"), [(3.0, 2), (4.0, 2), (5.0, 1)])
+def test_vertical_walls_make_no_horns(height, seed):
+    """No spline is as steep: the likeliest one would swing over the top, and its horns pass for the apex."""
+    ridge = rf.register(tube(seed, height), at=(0, 0, height))
+    rises = np.sign(np.diff(ridge.section(np.linspace(-0.5, 0.5, 1001))))
+    assert (np.diff(rises[rises != 0]) < 0).sum() == 1
+    assert np.median(ridge.height) == pytest.approx(height, rel=0.005)
+    assert abs(np.median(ridge.height) - height) < 3 * np.median(ridge.height_std)
+    assert np.median(ridge.half_height_width) == pytest.approx(6.0, rel=0.03)
