@@ -33,9 +33,6 @@ _AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
 """Of three coefficients, in the height at the middle one's knot."""
 _HIGH = 0.9
 """Height above which knots are on the top."""
-_TWO_HUMPS = 0.05
-"""Twice the log likelihood ratio, by points, beyond which points deny that there is one hump: then what is
-off is not the section, but noise, height or width, and none is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +65,6 @@ class FreeSection:
 def free_section(
     told: Told,
     section: Section,
-    count: int,
     spans: int,
     price: float,
     wider: float = WIDER,
@@ -76,7 +72,7 @@ def free_section(
 ) -> FreeSection | None:
     """The spline of so many spans that fits the points best, as smooth as they ask for; None if it is none.
 
-    told: what so many points say of it (`by_means`, `by_likelihood`); section: the one before; price: of a
+    told: what points say of it (`by_means`, `by_likelihood`); section: the one before; price: of a
     coefficient, in twice the log likelihood ratio. It spans `wider` widths: where its feet are `trimmed`
     tells once it is final. split: its top is as smooth as the points ask for there: as rough as steep flanks
     it would rise to a spike where one hump is asked for.
@@ -90,10 +86,7 @@ def free_section(
     if not found[3:-6].max() > 0:
         return None
     cost = 0.5 * price * freedom
-    humped = _humped(found, inverse, spans, cost, max(_TWO_HUMPS * count, cost))
-    if humped is None:
-        return None
-    found, shift, part = humped
+    found, shift, part = _humped(found, inverse, spans, cost)
     if not np.convolve(found[3:-6], _AT_KNOT).max() > 0:
         return None
     gain = _gain(matrix, right, found, section, spans, wider)
@@ -176,16 +169,13 @@ def smoothest_section(
     return found, float(free.sum()), inverse
 
 
-def _humped(
-    found: Array, inverse: Array, spans: int, price: float, most: float
-) -> tuple[Array, float, float] | None:
-    """The coefficients that rise to an apex and fall from it, symmetric unless that costs too much; None
-    where any such do.
+def _humped(found: Array, inverse: Array, spans: int, price: float) -> tuple[Array, float, float]:
+    """The coefficients that rise to an apex and fall from it, symmetric unless that costs too much.
 
     found, inverse: coefficients without this condition, and their covariance; price: what a symmetric one may
-    cost, most: what one hump may, in twice the log likelihood ratio. Noise makes bumps, and the highest would
-    pass for the apex. Also by how many knots the symmetric one is moved, and what part of the coefficients
-    are free.
+    cost, in twice the log likelihood ratio. Noise makes bumps, and the highest would pass for the apex; so
+    would horns at flanks steeper than any section. Also by how many knots the symmetric one is moved, and
+    what part of the coefficients are free.
     """
     inner = found[3:spans]
     # Given the inner ones the others follow.
@@ -195,10 +185,8 @@ def _humped(
     part = 0.5
     if cost > price:
         free, least = one_hump(inner, root)
-        if cost - least > price or cost > most:
-            one, shift, cost, part = free, 0.0, least, 1.0
-    if cost > most or not one.max() > 0:
-        return None
+        if cost - least > price:
+            one, shift, part = free, 0.0, 1.0
     out = found.copy()
     out[3:spans] = one
     rest = np.r_[spans + 3 : len(found)]

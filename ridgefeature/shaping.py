@@ -53,7 +53,7 @@ def shaped(
         own, named = best_named(*equations, section, SPANS, wider)
         if own.loss - named.loss > inflation * price:
             return named.section, named.applied(terms)
-    found = free_section(lambda *_: equations, section, len(points), SPANS, inflation * price, wider, exact)
+    found = free_section(lambda *_: equations, section, SPANS, inflation * price, wider, exact)
     if found is None or (section is not box() and found.gain / inflation < _PRICE * found.freedom):
         return section, terms
     return found.applied(terms)
@@ -69,7 +69,7 @@ def between_feet(
     terms[:, W] *= breadth
     seen, price = smear(section, terms, noise.blur, noise.even), inflation * np.log(len(points))
     told = told_of(points, terms, seen, noise, exact)
-    found = free_section(told, section, len(points), section.spans, price, 1.0, exact)
+    found = free_section(told, section, section.spans, price, 1.0, exact)
     return (section, terms) if found is None else found.applied(terms, LEARNED)
 
 
