@@ -9,6 +9,7 @@ from OCP.Geom import Geom_BSplineSurface
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from cad_export.carried import attach, faces_of
+from cad_export.fold_warning import checked_surface
 from cad_export.geometry import RidgeLike, make_face, surface_for
 from cad_export.occt_arrays import pole_array
 from cad_export.record import record_of
@@ -20,9 +21,10 @@ def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1) -> cq.Face:
     """One face with the exact poles and knots of ridge.resized(h=h, w=w).surface(), or of a Surface.
 
     In the frame and unit of the ridge; natural bounds; its normal is du x dv. Raises ValueError for anything
-    that is neither, and for rates of a plain Surface. The face carries the feature (`carried_by`).
+    that is neither, and for rates of a plain Surface; warns where a ridge's surface folds over itself. The
+    face carries the feature (`carried_by`).
     """
-    made = make_face(surface_for(ridge, h, w))
+    made = make_face(checked_surface(ridge, h, w))
     attach(made, record_of(ridge, h, w))
     return cq.Face(made)
 
@@ -40,7 +42,7 @@ def solid(
     The solid carries the feature (`carried_by`). Raises ValueError when a check fails, and says then which
     thickness goes.
     """
-    top = surface_for(ridge, h, w)
+    top = checked_surface(ridge, h, w)
     base = top if isinstance(ridge, Surface) else surface_for(ridge, 0, w)
     made = make_slab(top, base, thickness, check)
     attach(_face_on(made, top), record_of(ridge, h, w))

@@ -23,7 +23,8 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
 from cad_export.carried import attach, faces_of
-from cad_export.geometry import RidgeLike, make_face, surface_for, topods
+from cad_export.fold_warning import checked_surface
+from cad_export.geometry import RidgeLike, make_face, topods
 from cad_export.occt_session import quiet
 from cad_export.record import UNMOVED, Carried, record_of
 from cad_export.step_document import assembly_document, document, features_of, is_assembly
@@ -54,7 +55,7 @@ def step(
     named "ridge", "ridge 2", ... or as they were pasted, and coloured where their part has no colour. Every
     feature that the shape carries (`carried_by`) goes with it as a user property, for `load` to get back.
     The schema is one of SCHEMAS. OCCT writes 13 digits. The file is written beside the path and renamed, so
-    it is never half there.
+    it is never half there. Warns where a ridge's surface folds over itself.
     Raises ValueError for an unknown schema or suffix or something that is no shape, OSError when the file
     cannot be written.
     """
@@ -117,7 +118,7 @@ def _attach_by_name(shape: TopoDS_Shape, records: dict[str, Carried], transfer: 
 def shape_in_mm(source: Any, h: float = 1, w: float = 1) -> TopoDS_Shape:
     """The shape of anything that `step` takes, in millimetres; a Ridge's face carries its feature."""
     if isinstance(source, (Surface, RidgeLike)):
-        surface = surface_for(source, h, w)
+        surface = checked_surface(source, h, w)
         factor = _mm(getattr(source, "unit", "mm"))
         face = make_face(surface if factor == 1 else replace(surface, poles=surface.poles * factor))
         attach(face, record_of(source, h, w))

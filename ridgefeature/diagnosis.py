@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.curvilinear import local_coordinates, templates_on, thinned
+from ridgefeature.folds import with_folds
 from ridgefeature.grid import build_grid, nearest_distances
 from ridgefeature.kernels.strip import mixture
 from ridgefeature.ridge import Ridge
@@ -136,7 +137,7 @@ def diagnose(ridge: Ridge, scan: Scan | ArrayLike) -> Diagnosis:
         stretch_outliers=strays,
         stretch_coverage=covered,
         templates=_fits(ridge, s[kept & inner], d[kept & inner]),
-        doubts=_doubts(ridge, edges, rms / noise, strays, covered),
+        doubts=with_folds(_doubts(ridge, edges, rms / noise, strays, covered), ridge),
     )
 
 

@@ -12,8 +12,9 @@ from typing import Any, NoReturn
 
 import click
 
-BAD_INPUT, NO_RIDGE, INTERRUPTED = 2, 3, 130
-_INTERRUPTED = "interrupted; no file is half written"
+from ridgefeature.commands import interrupts
+
+BAD_INPUT, NO_RIDGE, INTERRUPTED = 2, 3, interrupts.STATUS
 
 
 class Program(click.Group):
@@ -21,7 +22,7 @@ class Program(click.Group):
 
     def main(self, *args: Any, **options: Any) -> NoReturn:
         options["standalone_mode"] = False
-        with warnings.catch_warnings():
+        with interrupts.heard(), warnings.catch_warnings():
             if not sys.warnoptions:
                 warnings.simplefilter("ignore")
                 warnings.filterwarnings("always", category=UserWarning)
@@ -33,28 +34,37 @@ class Program(click.Group):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            return fail(_INTERRUPTED, INTERRUPTED)
+            return fail(interrupts.told(), INTERRUPTED)
 
     def _status(self, *args: Any, **options: Any) -> int:
         try:
+            interrupts.check()
             result = super().main(*args, **options)
-        except click.exceptions.NoArgsIsHelpError as error:
+        except (click.Abort, KeyboardInterrupt):
+            return fail(interrupts.told(), INTERRUPTED)
+        except Exception as error:
+            # What fails once an interrupt has come fails by it.
+            return fail(interrupts.told(), INTERRUPTED) if interrupts.came() else self._failed(error)
+        status = result if isinstance(result, int) else 0
+        return fail(interrupts.told(), INTERRUPTED) if interrupts.came() and status == 0 else status
+
+    def _failed(self, error: Exception) -> int:
+        """Say why in one line; returns the exit status, raises what is no failure of the user's."""
+        if isinstance(error, click.exceptions.NoArgsIsHelpError):
             click.echo(error.format_message())
             return 0
-        except click.UsageError as error:
+        if isinstance(error, click.UsageError):
             return fail(usage(error, self._options()), BAD_INPUT)
-        except click.ClickException as error:
+        if isinstance(error, click.ClickException):
             return fail(error.format_message(), BAD_INPUT)
-        except (click.Abort, KeyboardInterrupt):
-            return fail(_INTERRUPTED, INTERRUPTED)
-        except OSError as error:
+        if isinstance(error, OSError):
             return fail(_reason(error), BAD_INPUT)
-        except ValueError as error:
+        if isinstance(error, ValueError):
             from ridgefeature import NoRidgeError
 
             status = NO_RIDGE if isinstance(error, NoRidgeError) else BAD_INPUT
             return fail(self._in_options(str(error)), status)
-        return result if isinstance(result, int) else 0
+        raise error
 
     def _in_options(self, message: str) -> str:
         return in_options(message, {str(o.name) for _, o in self._options()})

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from ridgefeature import Ridge, read_scan, register
-from ridgefeature.commands import output
+from ridgefeature.commands import interrupts, output
 from ridgefeature.commands.console import INTERRUPTED, fail, print_table
 from ridgefeature.commands.folder import beside, output_folder
 from ridgefeature.commands.progress import shown_progress
@@ -27,6 +27,7 @@ def run(folder: Path) -> int:
     with output_folder(folder, [SCAN, TALLER, *output.file_names(True, True)]):
         with beside(folder / SCAN) as name:
             np.save(name, spiral.points(_POINTS, _NOISE, seed=_SEED))
+        interrupts.wrote(SCAN)
         scan = read_scan(folder / SCAN)
         at = np.array(_PICK)
         pick = spiral.spine(at) + spiral.height(at) * np.array([0.0, 0.0, 1.0])
@@ -36,14 +37,16 @@ def run(folder: Path) -> int:
         click.echo(
             f"Registering it from one picked point, {number(pick[0])} {number(pick[1])} {number(pick[2])} ..."
         )
-        with shown_progress(scan.unit) as progress:
-            ridge = register(scan, pick, progress=progress)
+        with shown_progress(scan.unit) as progress, interrupts.at_once():
+            ridge = register(scan, pick, progress=interrupts.checking(progress))
+        interrupts.check()
         click.echo("Writing the feature, STEP and pictures ...\n")
         found = diagnose(ridge, scan)
         files = output.write(ridge, scan, folder, True, True, found)
         import cad_export
 
         cad_export.step(ridge, folder / TALLER, h=1.5)
+        interrupts.wrote(TALLER)
     print_table("The ridge found", output.rows(ridge, found))
     click.echo()
     print_table("Against the truth", _errors(ridge, spiral))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ridgefeature.commands import interrupts
 from ridgefeature.commands.feature_file import CAD, check_is_feature, chosen, load_feature
 from ridgefeature.readable import number
 
@@ -27,24 +28,30 @@ def run(feature: Path, output: Path, h: float | None, w: float | None, name: str
     from cad_export.formats import checked_target, write
 
     checked_target(output)
+    interrupts.writes(output.parent, [output.name], [])
     check_is_feature(feature)
-    rates: dict[str, float] = {}
-    if feature.suffix.lower() in CAD:
-        source, rates, said = _from_step(feature, output, h, w, name)
-    elif name is not None:
-        raise ValueError(f"--name: {feature.name} holds one ridge, which has no name; leave it out")
-    else:
-        source, rates = load_feature(feature), {"h": _or(h, 1.0), "w": _or(w, 1.0)}
-        said = f"the ridge at {_at(**rates)}"
+    with interrupts.at_once():
+        source, rates, said = _found(feature, output, h, w, name)
+    interrupts.check()
     if isinstance(source, Path):
         _copy(source, output)
     else:
         write(source, output, **rates)
+    interrupts.wrote(output.name)
     click.echo(f"wrote {output}: {said}")
 
 
 Found = tuple[Any, dict[str, float], str]
 """What to write (a Path: that file itself), the rates for it, and what to say of it."""
+
+
+def _found(feature: Path, output: Path, h: float | None, w: float | None, name: str | None) -> Found:
+    if feature.suffix.lower() in CAD:
+        return _from_step(feature, output, h, w, name)
+    if name is not None:
+        raise ValueError(f"--name: {feature.name} holds one ridge, which has no name; leave it out")
+    rates = {"h": _or(h, 1.0), "w": _or(w, 1.0)}
+    return load_feature(feature), rates, f"the ridge at {_at(**rates)}"
 
 
 def _from_step(file: Path, output: Path, h: float | None, w: float | None, name: str | None) -> Found:

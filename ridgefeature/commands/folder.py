@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ridgefeature.commands import interrupts
+
 
 @contextmanager
 def output_folder(folder: Path, names: Iterable[str]) -> Iterator[Path]:
@@ -15,6 +17,7 @@ def output_folder(folder: Path, names: Iterable[str]) -> Iterator[Path]:
 
     names: files that will be written. Raises OSError if that cannot be.
     """
+    names = list(names)
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder}: expected a folder to write to, this is a file: name another")
@@ -27,6 +30,7 @@ def output_folder(folder: Path, names: Iterable[str]) -> Iterator[Path]:
                 raise IsADirectoryError(
                     f"{folder / name}: expected a file to replace, this is a folder: remove it"
                 )
+        interrupts.writes(folder, names, made)
         yield folder
     except BaseException:
         for path in made:

@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ridgefeature.commands import output
+from ridgefeature.commands import interrupts, output
 from ridgefeature.commands.console import point, print_json, print_table
 from ridgefeature.commands.feature_file import CAD, load_feature
 from ridgefeature.readable import number
@@ -18,17 +18,20 @@ _ASSUMED = ", assumed: such files are read without one; --unit gives another"
 
 def run(file: Path, unit: str | None, as_json: bool) -> None:
     """Print it. Raises ValueError or OSError for a file that cannot be read."""
-    suffix = file.suffix.lower()
-    if suffix == ".json":
-        title, rows, document = _feature(file)
-    elif suffix in CAD and unit is None:
-        title, rows, document = _step(file)
-    else:
-        title, rows, document = _scan(file, unit)
+    with interrupts.at_once():
+        title, rows, document = _found(file, unit)
+    interrupts.check()
     if as_json:
         print_json({"file": str(file), **document})
     else:
         print_table(f"{file}: {title}", rows)
+
+
+def _found(file: Path, unit: str | None) -> Found:
+    suffix = file.suffix.lower()
+    if suffix == ".json":
+        return _feature(file)
+    return _step(file) if suffix in CAD and unit is None else _scan(file, unit)
 
 
 def _feature(file: Path) -> Found:

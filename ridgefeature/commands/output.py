@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ridgefeature.commands import interrupts
 from ridgefeature.commands.console import one_line, point, print_table
 from ridgefeature.diagnosis import Diagnosis
 from ridgefeature.readable import ends, kind, number, templates
@@ -24,23 +25,32 @@ def file_names(step: bool, pictures: bool) -> list[str]:
 def write(
     ridge: Ridge, scan: Scan, folder: Path, step: bool, pictures: bool, found: Diagnosis | None = None
 ) -> dict[str, str]:
-    """Write the files of a ridge; returns what is in each and its path. found: its diagnosis, if there."""
-    ridge.save(folder / FEATURE)
-    files = {"feature": str(folder / FEATURE)}
-    if step:
-        import cad_export
+    """Write the files of a ridge; returns what is in each and its path. found: its diagnosis, if there.
 
-        cad_export.step(ridge, folder / STEP)
-        files["step"] = str(folder / STEP)
+    An interrupt is raised between two files.
+    """
+    files = {"feature": FEATURE}
+    ridge.save(folder / FEATURE)
+    interrupts.wrote(FEATURE)
+    if step:
+        from cad_export import step as write_step
+
+        interrupts.check()
+        write_step(ridge, folder / STEP)
+        interrupts.wrote(STEP)
+        files["step"] = STEP
     if pictures:
         from ridgefeature import plot
 
+        interrupts.check()
         plot.profile(ridge, folder / PROFILE, scan)
+        interrupts.wrote(PROFILE)
         plot.view(scan, ridge, folder / VIEW)
+        interrupts.wrote(VIEW)
         plot.deviation(scan, ridge, folder / DEVIATION, found)
-        names = {"profile": PROFILE, "view": VIEW, "deviation": DEVIATION}
-        files |= {kind: str(folder / name) for kind, name in names.items()}
-    return files
+        interrupts.wrote(DEVIATION)
+        files |= {"profile": PROFILE, "view": VIEW, "deviation": DEVIATION}
+    return {kind: str(folder / name) for kind, name in files.items()}
 
 
 def document(ridge: Ridge, found: Diagnosis | None = None) -> dict[str, Any]:

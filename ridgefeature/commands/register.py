@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ridgefeature import read_scan, register
-from ridgefeature.commands import output
+from ridgefeature.commands import interrupts, output
 from ridgefeature.commands.console import INTERRUPTED, fail, print_json
 from ridgefeature.commands.folder import output_folder
 from ridgefeature.commands.options import settings_from
@@ -30,10 +30,13 @@ def run(
     step, pictures = not no_step, not no_pictures
     with output_folder(out, output.file_names(step, pictures)) as folder:
         count = {} if sample is None else {"sample": sample}
-        points = read_scan(scan, vertices=vertices, unit=unit, **count)
-        with shown_progress(points.unit) as progress:
-            ridge = register(points, settings=settings, progress=progress, **options)
+        with interrupts.at_once():
+            points = read_scan(scan, vertices=vertices, unit=unit, **count)
+        with shown_progress(points.unit) as progress, interrupts.at_once():
+            ridge = register(points, settings=settings, progress=interrupts.checking(progress), **options)
+        interrupts.check()
         found = diagnose(ridge, points)
+        interrupts.check()
         files = output.write(ridge, points, folder, step, pictures, found)
     if as_json:
         print_json({**output.document(ridge, found), "files": files})
