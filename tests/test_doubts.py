@@ -12,7 +12,7 @@ import ridgefeature as rf
 from ridgefeature.commands import output
 from ridgefeature.curvilinear import local_coordinates
 from ridgefeature.readable import rows
-from ridgefeature.section import bell
+from ridgefeature.section import Section, bell
 
 Array = NDArray[np.float64]
 PICK = (0.0, 0.0, 3.0)
@@ -91,3 +91,9 @@ def test_a_pick_on_the_ridge_or_close_to_it_is_none(
     found = rf.diagnose(near, points)
     assert found.doubts == () and dict(rows(near, found))["in doubt"] == "no stretch"
     assert dict(output.rows(near, found))["pick"] == " ".join(f"{x:.6g}" for x in at)
+
+
+def test_a_section_is_told_by_a_name_that_is_documented(ridge: rf.Ridge) -> None:
+    for name, told in (("free", "learned"), ("learned", "learned"), ("bell", "bell")):
+        named = replace(ridge, section=Section(ridge.section.coefficients, name))
+        assert dict(output.rows(named))["section"] == named.summary()["section"] == told
