@@ -25,6 +25,7 @@ from OCP.TopoDS import TopoDS_Shape
 from cad_export.occt_session import quiet
 from cad_export.step_document import document
 from cad_export.step_file import shape_in_mm, step
+from ridgefeature.io.target import naming
 from ridgefeature.ridge import Ridge
 
 _CHORD = 1e-4  # of the diagonal: triangles closer to the surface than a scan's noise
@@ -44,7 +45,9 @@ def write(ridge_or_shape: Any, path: str | os.PathLike[str], h: float = 1, w: fl
     writer = FORMATS[target.suffix.lower()]
     if writer is step:
         return step(ridge_or_shape, target, h=h, w=w)
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}.") as folder:
+    with naming(target):
+        beside = tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}.")
+    with beside as folder:
         made = Path(folder) / target.name
         if writer is _macro:
             _macro(_ridge(ridge_or_shape, h, w), made)

@@ -32,6 +32,7 @@ from cad_export.step_model import add_properties, name_faces, name_products, nam
 from cad_export.step_properties import items, records_in
 from cad_export.step_text import directives
 from ridgefeature.bspline import Surface
+from ridgefeature.io.target import naming
 from ridgefeature.ridge import Ridge
 
 SCHEMAS = {
@@ -70,12 +71,13 @@ def step(
     if not target.parent.is_dir():
         raise FileNotFoundError(f"expected a folder to write to, got {str(target.parent)!r}; create it first")
     beside = target.with_name(f".{target.stem}.{os.getpid()}-{threading.get_ident()}.step")
-    try:
-        beside.touch()  # OCCT says only that it failed; this says why
-        _write(source, beside, SCHEMAS[schema.upper()], target.stem)
-        os.replace(beside, target)
-    finally:
-        beside.unlink(missing_ok=True)
+    with naming(target):
+        try:
+            beside.touch()  # OCCT says only that it failed; this says why
+            _write(source, beside, SCHEMAS[schema.upper()], target.stem)
+            os.replace(beside, target)
+        finally:
+            beside.unlink(missing_ok=True)
     return target
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.curvilinear import local_coordinates, templates_on, thinned
+from ridgefeature.doubts import doubts, to_one_side
 from ridgefeature.folds import with_folds
 from ridgefeature.grid import build_grid, nearest_distances
 from ridgefeature.kernels.strip import mixture
@@ -32,9 +33,6 @@ _STRETCH, _STRETCHES = 0.5, (8, 60)
 """Length of a stretch in widths between the feet; least and largest number of them."""
 _NORMAL = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
-_SEEN, _OFF, _STRAYS, _KNOWN = 0.5, 2.5, 0.4, 0.2
-"""A stretch is in doubt with less of it seen, points further off in noise levels, a larger share of strays,
-or a standard deviation of height or of width at half height that is larger, in these."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,7 @@ def diagnose(ridge: Ridge, scan: Scan | ArrayLike) -> Diagnosis:
     covered = np.bincount(part, seen.mean(axis=1), len(edges) - 1) / np.bincount(
         part, minlength=len(edges) - 1
     )
-    kept = ~stray
+    kept, side = ~stray, np.where(stray, np.sign(d), 0.0)
     return Diagnosis(
         arc_length=s,
         across=y,
@@ -137,7 +135,9 @@ def diagnose(ridge: Ridge, scan: Scan | ArrayLike) -> Diagnosis:
         stretch_outliers=strays,
         stretch_coverage=covered,
         templates=_fits(ridge, s[kept & inner], d[kept & inner]),
-        doubts=with_folds(_doubts(ridge, edges, rms / noise, strays, covered), ridge),
+        doubts=with_folds(
+            doubts(ridge, edges, rms / noise, strays, covered, to_one_side(ridge, edges, s, y, side)), ridge
+        ),
     )
 
 
@@ -232,32 +232,3 @@ def _fits(ridge: Ridge, s: Array, d: Array) -> tuple[TemplateFit, ...]:
         counts = template.status, template.points, template.inliers, template.evaluations
         fits.append(TemplateFit(float(middle), *counts, template.M, template.M_floor, rms))
     return tuple(fits)
-
-
-def _doubts(
-    ridge: Ridge, edges: Array, off: Array, strays: Array, covered: Array
-) -> tuple[tuple[float, float, str], ...]:
-    """Stretches in doubt, neighbours with the same reason joined."""
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        loose = np.maximum(
-            ridge.height_std / np.abs(ridge.height), ridge.half_height_width_std / ridge.half_height_width
-        )
-    known = np.interp(middles, ridge.arc_length, np.where(np.isfinite(loose), loose, np.inf))
-    reasons = []
-    for seen, far, stray, std in zip(covered, off, strays, known, strict=True):
-        if seen < _SEEN:
-            reasons.append(f"less than {100 * _SEEN:.0f} % of the surface seen")
-        elif stray > _STRAYS or far > _OFF:
-            reasons.append("points lie off the surface")
-        elif std > _KNOWN:
-            reasons.append(f"height or width not known to {100 * _KNOWN:.0f} %")
-        else:
-            reasons.append("")
-    runs: list[tuple[float, float, str]] = []
-    for low, high, why in zip(edges[:-1], edges[1:], reasons, strict=True):
-        if runs and runs[-1][2] == why:
-            runs[-1] = (runs[-1][0], float(high), why)
-        else:
-            runs.append((float(low), float(high), why))
-    return tuple(run for run in runs if run[2])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ridgefeature.curvilinear import templates_on
+from ridgefeature.doubts import pick_missed
 
 if TYPE_CHECKING:
     from ridgefeature.diagnosis import Diagnosis
@@ -46,6 +47,17 @@ def templates(ridge: Ridge) -> str:
     """How many templates the march fitted, and how many of them are part of the finished ridge."""
     fitted, on = len(ridge.templates), len(templates_on(ridge)[0])
     return f"{fitted}" if on == fitted else f"{fitted}, {on} of them on the finished ridge"
+
+
+def pick(ridge: Ridge) -> str:
+    """Where it was picked; and how far from the ridge that is, where it is not on it."""
+    at, missed = " ".join(f"{x:.6g}" for x in ridge.pick), pick_missed(ridge)
+    if missed is None:
+        return at
+    return (
+        f"{at}: {number(missed[0], 3)} {ridge.unit} ({missed[1]:.2g} widths) from the ridge; see whether it "
+        "is the one that is meant, else pick nearer to its crest"
+    )
 
 
 def ends(ridge: Ridge) -> list[tuple[str, str]]:

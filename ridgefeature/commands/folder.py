@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ridgefeature.commands import interrupts
+from ridgefeature.io.target import naming
 
 
 @contextmanager
@@ -23,7 +24,7 @@ def output_folder(folder: Path, names: Iterable[str]) -> Iterator[Path]:
         raise NotADirectoryError(f"{folder}: expected a folder to write to, this is a file: name another")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        with naming(folder), tempfile.TemporaryFile(dir=folder):
             pass
         for name in names:
             if (folder / name).is_dir():

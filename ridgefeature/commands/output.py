@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from ridgefeature.commands import interrupts
-from ridgefeature.commands.console import one_line, point, print_table
+from ridgefeature.commands.console import one_line, print_table
 from ridgefeature.diagnosis import Diagnosis
-from ridgefeature.readable import ends, kind, number, templates
+from ridgefeature.readable import ends, kind, number, pick, templates
 from ridgefeature.readable import rows as trust
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
@@ -81,7 +81,7 @@ def rows(ridge: Ridge, found: Diagnosis | None = None) -> list[tuple[str, str]]:
             "mean distance M",
             f"{number(figures['M'], 3)} {unit}, where a perfect patch has {number(figures['M_floor'], 3)}",
         ),
-        ("pick", point(ridge.pick)),
+        ("pick", pick(ridge)),
         *(
             [("noise", f"{number(figures['noise'], 3)} {unit}"), *ends(ridge)]
             if found is None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ridgefeature.io.target import naming
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
@@ -100,7 +101,8 @@ def write_feature(ridge: Ridge, path: str | os.PathLike[str]) -> Path:
     """Write the ridge beside `path`, then rename it. Raises OSError if the folder cannot be written."""
     path = Path(path)
     text = json.dumps(to_document(ridge), indent=1)
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    with naming(path):
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     try:
         with os.fdopen(descriptor, "w", encoding="ascii") as file:
             file.write(text)

@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ridgefeature.io.target import naming
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -26,7 +28,8 @@ def new_figure(width: int, height: int) -> Figure:
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """Write the figure as PNG beside `path`, then rename it. Raises OSError if it cannot be written."""
     path = Path(path)
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    with naming(path):
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     try:
         with os.fdopen(descriptor, "wb") as file:
             figure.savefig(file, format="png", dpi=DPI)
