@@ -39,8 +39,9 @@ def folds(ridge: Ridge, surface: Surface | None = None) -> tuple[tuple[float, fl
 
 
 def with_folds(doubts: Doubts, ridge: Ridge) -> Doubts:
-    """Doubts and the stretches that fold, in order."""
-    return tuple(sorted([*doubts, *((low, high, WHY) for low, high in folds(ridge))]))
+    """Doubts and the stretches that fold, in order; of those that begin alike the longest first."""
+    found = [*doubts, *((low, high, WHY) for low, high in folds(ridge))]
+    return tuple(sorted(found, key=lambda doubt: (doubt[0], -doubt[1])))
 
 
 def told_folds(ridge: Ridge, surface: Surface) -> str:

@@ -14,7 +14,7 @@ from made_ridges import made_ridge
 import cad_export as cx
 import ridgefeature as rf
 from ridgefeature import diagnosis
-from ridgefeature.folds import WHY, folds
+from ridgefeature.folds import WHY, folds, with_folds
 
 
 def hooked(radius: float, start: float = 50.0) -> rf.Ridge:
@@ -77,3 +77,10 @@ def test_the_size_of_the_unit_does_not_matter() -> None:
     ridge, factor = hooked(4.0), 1e-3
     lengths = {n: factor * getattr(ridge, n) for n in ("arc_length", "spine", "height", "width", "border")}
     np.testing.assert_allclose(folds(replace(ridge, **lengths)), factor * np.array(folds(ridge)))
+
+
+def test_a_doubt_of_the_whole_ridge_stays_first() -> None:
+    ridge = hooked(3.0)
+    whole, part = (0.0, ridge.length, "missed"), (0.0, 4.0, "unseen")
+    found = with_folds((whole, part), ridge)
+    assert found[:2] == (whole, part) and found[2][2] == WHY
