@@ -226,7 +226,7 @@ def corners(
         radius = _CORNER_RADIUS * last.width * np.sign(angle)
         ahead = np.cos(angle) * along + np.sin(angle) * left
         corner = end + radius * (np.sin(angle) * along + (1 - np.cos(angle)) * left)
-        axes = np.column_stack([ahead, np.cross(up, ahead), up])
+        axes = np.column_stack([ahead, np.cos(angle) * left - np.sin(angle) * along, up])
         place, base = corner + 0.5 * straight.length * ahead, seen_from(last.base, last.rotation.T @ axes)
         found.append(straight.changed(position=place, rotation=axes, base=base))
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from statistics import NormalDist
 
@@ -160,6 +161,7 @@ def less_noisy(bent: Template, flat: Template) -> bool:
     return bent.status not in ("failed", "no data") and bent.scale < flat.scale
 
 
+@lru_cache(maxsize=1024)  # a march asks for few of them, many times
 def _chi_square(degrees: int, chance: float) -> float:
     """Value that chi-square of so many degrees exceeds by this chance (Wilson and Hilferty 1931)."""
     share = 2.0 / (9.0 * degrees)

@@ -155,13 +155,15 @@ def smoothest_section(
     pinned[[0, 1, 2, n - 3, n - 2, n - 1]] = 1e3 * np.diagonal(matrix)[:n].max()
     size = float(np.diagonal(matrix)[:n].mean())
     lam = np.full(len(parts), 1e-3 * size)
-    ridge = np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
+    known = matrix + np.diag(1e-9 * np.diagonal(matrix) + pinned + 1e-300)
     for _ in range(_ROUNDS):
-        whole = matrix + np.tensordot(lam, penalties, 1) + ridge
+        whole = known.copy()
+        for weight, penalty in zip(lam, penalties, strict=True):
+            whole += weight * penalty
         inverse = np.asarray(np.linalg.inv(whole), dtype=np.float64)
         found = inverse @ right
         rough = np.array([((part @ found) ** 2).sum() for part in parts])
-        tied = lam * (penalties * inverse).sum(axis=(1, 2))
+        tied = lam * [np.vdot(penalty, inverse) for penalty in penalties]
         free = np.maximum([len(part) for part in parts] - tied, 1e-2)
         # Always as many rounds: stopping early would let rounding decide on the result.
         low, high = np.maximum(1e-2 * lam, 1e-9 * size), np.minimum(1e2 * lam, 1e6 * size)

@@ -6,7 +6,6 @@ A spline along a ridge goes on beyond its last points as it likes, and follows w
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ def held(joint: Joint, open_ends: tuple[bool, bool], kept: float | None = None) 
     misfit, terms = joint.misfit, joint.terms
     before, after = (0, n) if kept is None else 2 * (int(np.argmin(np.abs(at - kept))),)
     end = _on_top(misfit[:, 2], same_ridge(joint, 0, n, before)) if open_ends[1] else n
-    turned = replace(joint, misfit=misfit[::-1], terms=terms[::-1])
+    turned = joint.backwards
     start = _on_top(misfit[::-1, 2], same_ridge(turned, 0, n, n - after)) if open_ends[0] else n
     low, high = usual_ends(at, terms[:, W], open_ends)
     end, start = min(end, max(high, before)), min(start, n - min(low, after))

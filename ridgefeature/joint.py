@@ -21,7 +21,7 @@ from ridgefeature.section import Section, box
 from ridgefeature.section_std import SectionStd, section_std
 from ridgefeature.settings import Settings
 from ridgefeature.shaping import between_feet, shaped, told_of
-from ridgefeature.smearing import Smeared, log_likelihood
+from ridgefeature.smearing import Smeared, log_likelihood, smear
 from ridgefeature.smoothing import Smooth
 from ridgefeature.steep_end import likelier
 from ridgefeature.steep_start import likeliest
@@ -73,19 +73,34 @@ class Joint:
     matrix: Array
     goal: Array
     """(n - 1, 6, 6), (n - 1, 6) normal equations of the terms in each stretch, as its points alone tell."""
-    counts: Array
-    """(n - 1,) points of each stretch, strays too, by the area on which they lie, in squared widths."""
-    misfit: Array
-    """(n - 1, 3) points of each stretch between the feet, the sum of their squared distances from the surface
-    in noise scales or, if that is more, least noises, none more than 25, and how many lie near its top."""
     noise: Noise
     inflation: float
     """Variance of sums over neighbouring points, by what it would be if their noise was independent."""
-
-    seen: Smeared
-    """The section as points so noisy show it."""
+    flats: float
+    """Breadth of the base beside the ridge that was looked at, in widths."""
     exact: bool = False
     """Whether by the likelihood of the points itself, not by mean heights."""
+
+    @cached_property
+    def seen(self) -> Smeared:
+        """The section as points so noisy show it."""
+        return smear(self.section, self.terms, self.noise.blur, self.noise.even)
+
+    @cached_property
+    def counts(self) -> Array:
+        """(n - 1,) points of each stretch, strays too, by the area on which they lie, in squared widths."""
+        stretches = len(self.path.at) - 1
+        count = np.bincount(self.points[:, 0].astype(np.int64), minlength=stretches)[:stretches]
+        girth = self.flats + 1.0 + self.noise.even * (_girths(self.section, self.terms) - 1.0)
+        return np.asarray(count / (girth * self.path.width[1:] ** 2))
+
+    @cached_property
+    def misfit(self) -> Array:
+        """(n - 1, 3) points of each stretch between the feet, the sum of their squared distances from the
+        surface in noise scales or, if that is more, least noises, none more than 25, and how many lie near
+        its top."""
+        some, noise = _some(self.points), (self.noise.scale, least_noise(self.terms), _FAR_OFF)
+        return misfit_sums(some, self.terms, self.seen.told, *noise, self.section.top)
 
     @cached_property
     def section_std(self) -> SectionStd:
@@ -115,6 +130,17 @@ class Joint:
         growth = max(inflation / self.inflation, 1.0)
         smooth = replace(self.smooth, covariance=growth * self.smooth.covariance)
         return replace(self, smooth=smooth, inflation=growth * self.inflation)
+
+    @cached_property
+    def backwards(self) -> Joint:
+        """The same stretches in the other order, for what is told of the last end of a ridge."""
+        path = self.path
+        path = replace(path, at=-path.at[::-1], height=path.height[::-1], width=path.width[::-1])
+        turned = {name: getattr(self, name)[::-1] for name in ("terms", "matrix", "goal")}
+        back = replace(self, path=path, **turned)
+        # The points' own coordinates still run as they did: these tell nothing of the other order.
+        vars(back).update({name: getattr(self, name)[::-1] for name in ("counts", "misfit")})
+        return back
 
     @property
     def chance(self) -> float:
@@ -183,7 +209,7 @@ def fit_whole(
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
     if state is None or state.fit is None:
         return None
-    return _joint(task, points, state, state.fit, 2.0 * beside)
+    return _joint(path, points, state, state.fit, beside)
 
 
 def with_common_errors(joint: Joint, settings: Settings, flat: bool) -> Joint | None:
@@ -198,7 +224,7 @@ def with_common_errors(joint: Joint, settings: Settings, flat: bool) -> Joint | 
         state = improved(task, joint.points, state, 0, shared=True)
     if state is None or state.fit is None:
         return None
-    return _joint(task, joint.points, state, state.fit, 2.0 * _beside(joint.path, settings))
+    return _joint(joint.path, joint.points, state, state.fit, _beside(joint.path, settings))
 
 
 def _beside(path: PathFrame, settings: Settings) -> float:
@@ -250,18 +276,12 @@ def _reshaped(task: Task, state: State) -> State:
     return new if chance(task.some, new) > chance(task.some, state) else state
 
 
-def _joint(task: Task, points: Array, state: State, fit: Fit, flats: float) -> Joint:
-    """flats: breadth of the base beside the ridge that was looked at, in widths."""
-    terms, noise = state.terms, state.noise
-    stretches = len(task.path.at) - 1
-    count = np.bincount(points[:, 0].astype(np.int64), minlength=stretches)[:stretches]
-    girth = flats + 1.0 + noise.even * (_girths(state.section, terms) - 1.0)
-    counts = count / (girth * task.path.width[1:] ** 2)
-    misfit = misfit_sums(
-        task.some, terms, state.seen.told, noise.scale, least_noise(terms), _FAR_OFF, state.section.top
-    )
-    told = fit.smooth, terms, state.section, fit.matrix, fit.goal, counts, misfit
-    return Joint(task.path, points, *told, noise, state.inflation, state.seen, fit.exact)
+def _joint(path: PathFrame, points: Array, state: State, fit: Fit, beside: float) -> Joint:
+    told = fit.smooth, state.terms, state.section, fit.matrix, fit.goal, state.noise, state.inflation
+    joint = Joint(path, points, *told, 2.0 * beside, fit.exact)
+    if "seen" in vars(state):
+        vars(joint)["seen"] = state.seen  # which would else be worked out again
+    return joint
 
 
 def _hardly_moved(task: Task, before: State | None, after: State) -> bool:

@@ -37,7 +37,7 @@ def stations_of(
     closed = path.overlap > 0
     start, end = between or (float(path.at[0]) + path.overlap, float(path.at[-1]) - path.overlap)
     s = np.linspace(start, end, count)
-    spine = _places(joint, s)[0]
+    spine = _places(joint, s, False)[0]
     chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spine, axis=0), axis=1))])
     if closed:
         spine[-1] = spine[0]
@@ -90,15 +90,15 @@ def with_section_std(stations: Stations, joint: Joint) -> Stations:
     )
 
 
-def _places(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
+def _places(joint: Joint, s: Array, sure: bool = True) -> tuple[Array, Array, Array, Array]:
     """Spine, normal (k, 3 each); curvature, height, width (k, 3); standard deviations of these two
-    and of the place sideways (k, 3).
+    and of the place sideways (k, 3), zeros unless `sure`.
 
     s (k,): arc lengths of the path that the ridge was fitted along.
     """
     path = joint.path
     if not path.overlap:
-        return _unblended(joint, s)
+        return _unblended(joint, s, sure)
     # A ring was fitted beyond its seam at both ends: there one end fades into the other.
     length = float(path.at[-1] - path.at[0]) - 2.0 * path.overlap
     signed = (s + 0.5 * length) % length - 0.5 * length
@@ -106,12 +106,12 @@ def _places(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
     low = np.where(near, signed, s % length)
     x = np.clip(0.5 * (signed / path.overlap + 1.0), 0.0, 1.0)
     share = np.where(near, x**3 * (10 - 15 * x + 6 * x * x), 1.0)[:, None]
-    one, other = _unblended(joint, low), _unblended(joint, np.where(near, signed + length, low))
+    one, other = (_unblended(joint, x, sure) for x in (low, np.where(near, signed + length, low)))
     blend = [share * a + (1.0 - share) * b for a, b in zip(one, other, strict=True)]
     return blend[0], blend[1], blend[2], blend[3]
 
 
-def _unblended(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
+def _unblended(joint: Joint, s: Array, sure: bool) -> tuple[Array, Array, Array, Array]:
     path = joint.path
     place = np.interp(s, path.at, path.knots)
     first, basis = basis_at(path.coefficients, place)
@@ -123,5 +123,7 @@ def _unblended(joint: Joint, s: Array) -> tuple[Array, Array, Array, Array]:
     rise = a + b * e + (0.5 * bend + c) * e * e
     spine = origin + e[:, None] * left + rise[:, None] * normal
     up = unit(normal - tilt[:, None] * left)
-    stds = [joint.smooth.deviations(first, basis, term) for term in (H, W, E)]
-    return spine, up, np.column_stack([bend + 2.0 * c, h, w]), np.column_stack(stds)
+    stds = np.zeros((3, len(s)))
+    if sure:
+        stds = np.array([joint.smooth.deviations(first, basis, term) for term in (H, W, E)])
+    return spine, up, np.column_stack([bend + 2.0 * c, h, w]), stds.T

@@ -198,10 +198,10 @@ def _wanted_differences(path: PathFrame) -> Array:
     def rate(x: Array) -> Array:
         return np.asarray(np.gradient(x, s, axis=0))
 
-    turn = rate(path.tangent)
-    bow = rate((turn * path.normal).sum(axis=1))
-    geodesic = rate((turn * path.left).sum(axis=1))
-    twist = rate(-(rate(path.normal) * path.left).sum(axis=1))
+    turns = rate(np.column_stack([path.tangent, path.normal]))
+    turn, tip = turns[:, :3], turns[:, 3:]
+    bends = [(turn * path.normal).sum(axis=1), (turn * path.left).sum(axis=1), -(tip * path.left).sum(axis=1)]
+    bow, geodesic, twist = rate(np.column_stack(bends)).T
     step = np.gradient(s, path.knots)
     for term, order, change in ((A, 3, bow), (E, 3, geodesic), (B, 2, twist)):
         # The middle of the coefficients of a difference; the i-th is centred i - 1 knots from the start.

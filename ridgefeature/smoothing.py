@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.basis import local_basis
 from ridgefeature.kernels.penalised import assembled, changed_band, local_covariances, most_likely
 
 Floats = NDArray[np.float64]
@@ -45,14 +44,17 @@ class Smooth:
         return Smooth(self.coefficients @ change.T, covariance, self.weights, self.freedom)
 
 
-def even_knots(n: int) -> Floats:
-    """Knots (n + 4,) of n cubic splines on [0, n - 3], one a unit, running on beyond both ends."""
-    return np.arange(-3.0, n + 1.0)
-
-
 def basis_at(n: int, at: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """First function and values (m, 4) of the cubic splines on even knots at `at` (m,)."""
-    return local_basis(even_knots(n), 3, np.clip(at, 0.0, n - 3.0))
+    """First function and values (m, 4) of n cubic splines on even knots, one a unit, at `at` (m,) in
+    [0, n - 3]."""
+    t = np.clip(at, 0.0, n - 3.0)
+    first = np.minimum(t, n - 4.0).astype(np.intp)
+    u = t - first
+    v, uu = 1.0 - u, u * u
+    inner = 0.5 * uu * (u - 2.0) + 2.0 / 3.0
+    last = uu * u / 6.0
+    before = v * v * v / 6.0
+    return first, np.stack([before, inner, 1.0 - before - inner - last, last], axis=1)
 
 
 def smoothest(

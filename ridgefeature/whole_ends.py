@@ -6,8 +6,6 @@ or nothing but strays is left, it is cut.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -93,17 +91,9 @@ def ends_of(
         end = _end_of(joint, before, shown, start, end, ahead, start if kept is None else kept)
     if open_ends[0]:
         backwards = tuple(values[::-1] for values in shown)
-        told = _backwards(joint), _backwards(before), backwards
+        told = joint.backwards, before.backwards, backwards
         start = -_end_of(*told, -end, -start, ahead, -(end if kept is None else kept))
     return start, end
-
-
-def _backwards(joint: Joint) -> Joint:
-    """The same stretches in the other order, for what is told of the last end of a ridge."""
-    path = joint.path
-    path = replace(path, at=-path.at[::-1], height=path.height[::-1], width=path.width[::-1])
-    turned = {name: getattr(joint, name)[::-1] for name in ("terms", "matrix", "goal", "counts", "misfit")}
-    return replace(joint, path=path, **turned)
 
 
 def _end_of(
@@ -218,7 +208,7 @@ def end_interval(joint: Joint, place: float, outwards: int) -> tuple[float, floa
     on as long as the points of one width show anything.
     """
     if outwards < 0:
-        low, high = end_interval(_backwards(joint), -place, 1)
+        low, high = end_interval(joint.backwards, -place, 1)
         return -high, -low
     at = joint.path.at
     i = int(np.argmin(np.abs(at - place)))

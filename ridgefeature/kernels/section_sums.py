@@ -27,8 +27,8 @@ def cell_sums(
     values, reach, stride = seen
     cells = values.shape[1] - 1
     out = np.zeros((values.shape[0], cells, 2 + BASE))
-    base_matrix, base_right = np.zeros((BASE, BASE)), np.zeros(BASE)
-    row = np.empty(BASE)
+    # Sums of powers of y, from 0: in registers, the loop takes half the time.
+    p0 = p1 = p2 = p3 = p4 = q0 = q1 = q2 = 0.0
     for i in range(points.shape[0]):
         y = points[i, 1]
         _, there = terms_at(terms, points[i, 0])
@@ -37,20 +37,28 @@ def cell_sums(
         raised = there[4] * per_scale
         goal = r + growth * raised
         weight = share_of_surface(far, per_scale * scale, stray)
-        row[0], row[1], row[2] = per_scale, y * per_scale, y * y * per_scale
-        for k in range(BASE):
-            base_right[k] += weight * goal * row[k]
-            for p in range(BASE):
-                base_matrix[k, p] += weight * row[k] * row[p]
+        square, share = y * y, weight * per_scale
+        known, wanted = share * per_scale, share * goal
+        p0 += known
+        p1 += known * y
+        p2 += known * square
+        p3 += known * square * y
+        p4 += known * square * square
+        q0 += wanted
+        q1 += wanted * y
+        q2 += wanted * square
         place = (eta / reach + 1.0) * 0.5 * cells
         if not 0.0 <= place < cells:
             continue
         own = out[m, np.int64(place)]
-        own[0] += weight * raised * raised
-        own[1] += weight * raised * goal
-        for k in range(BASE):
-            own[2 + k] += weight * raised * row[k]
-    return out, base_matrix, base_right
+        lifted = weight * raised
+        own[0] += lifted * raised
+        own[1] += lifted * goal
+        lifted *= per_scale
+        own[2] += lifted
+        own[3] += lifted * y
+        own[4] += lifted * square
+    return out, np.array([[p0, p1, p2], [p1, p2, p3], [p2, p3, p4]]), np.array([q0, q1, q2])
 
 
 @njit(**OPTIONS)
