@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ridgefeature.beyond import continued
 from ridgefeature.free_section import FREE
 from ridgefeature.grid import Grid
-from ridgefeature.joint_rounds import Fit, State, Task, chance, improved, is_steep, task_of
+from ridgefeature.joint_rounds import Fit, State, Task, chance, hardly_moved, improved, is_steep, task_of
 from ridgefeature.kernels.section_sums import misfit_sums
-from ridgefeature.kernels.strip import TERMS, A, C, E, H, W
+from ridgefeature.kernels.strip import TERMS, C, E, H, W
 from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
@@ -54,8 +54,6 @@ _GIRTH = 41
 _COARSE = 2.0
 """Distances of points from a steep ridge, by the noise beside it, from which on its flanks are steeper than
 any section: the likeliest one would have horns."""
-_MOVED = 0.02
-"""Largest change of terms by a round, in heights and widths, up to which it may be the last but one."""
 _FEWEST = 60
 """Points of the smallest ridge that is refitted."""
 
@@ -203,7 +201,7 @@ def fit_whole(
         if shaping:
             new = _reshaped(task, state)
             shaping, state = new.section is not state.section or new.section is box(), new
-            if brief and not shaping and _hardly_moved(task, known, state):
+            if brief and not shaping and hardly_moved(task, known, state):
                 break
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))
@@ -282,16 +280,6 @@ def _joint(path: PathFrame, points: Array, state: State, fit: Fit, beside: float
     if "seen" in vars(state):
         vars(joint)["seen"] = state.seen  # which would else be worked out again
     return joint
-
-
-def _hardly_moved(task: Task, before: State | None, after: State) -> bool:
-    """Whether a round changed the terms by so little that one more would change nothing."""
-    if before is None or task.steep:
-        return False
-    moved = np.abs(after.terms - before.terms).max(axis=0)
-    return bool(
-        max(moved[A], moved[H]) < _MOVED * task.height and max(moved[E], moved[W]) < _MOVED * task.width
-    )
 
 
 def _girths(section: Section, terms: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ridgefeature.foot_points import distances
 from ridgefeature.foot_points import information as foot_information
 from ridgefeature.kernels.information import information
-from ridgefeature.kernels.strip import C, W, mixture, offsets
+from ridgefeature.kernels.strip import A, C, E, H, W, mixture, offsets
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame
 from ridgefeature.scan_lines import scan_lines
@@ -27,6 +27,8 @@ _ROUNDS, _LAST_ROUNDS = 2, 4
 """In which weights of penalties become likelier: few of them as long as the terms are not known well."""
 _TELLING = 5000
 """As many points tell how likely a state is."""
+_MOVED = 0.02
+"""Largest change of terms by a round, in heights and widths, up to which it may be the last but one."""
 _IN_STRIPS = 0.6
 """Share of what a fit follows of its points' errors that sums over narrow strips show. Measured on fits to
 independent errors: 0.45 to 0.9."""
@@ -149,6 +151,16 @@ def improved(
     terms[:, W] = np.clip(terms[:, W], 0.4 * path.width, 2.5 * path.width)
     fit = Fit(smooth, matrix, goal, exact)
     return State(terms, state.section, noise, smooth.weights, inflation, smooth.freedom, fit)
+
+
+def hardly_moved(task: Task, before: State | None, after: State) -> bool:
+    """Whether a round changed the terms by so little that one more would change nothing."""
+    if before is None or task.steep:
+        return False
+    moved = np.abs(after.terms - before.terms).max(axis=0)
+    return bool(
+        max(moved[A], moved[H]) < _MOVED * task.height and max(moved[E], moved[W]) < _MOVED * task.width
+    )
 
 
 def chance(points: Array, state: State) -> float:
