@@ -1,0 +1,1 @@
+"""The web page: look at a scan, click on a ridge, slide its height and width, take it away."""

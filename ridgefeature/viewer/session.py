@@ -1,0 +1,120 @@
+"""What is open on the page: ridges by name, their rates, and the way back to what was before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import count
+
+from ridgefeature.ridge import Ridge
+
+LEAST, MOST = 0.2, 3.0
+"""Rates of height and width that sliders reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A registered ridge and how it was changed."""
+
+    name: str
+    registered: Ridge
+    pick: tuple[float, float, float]
+    h: float = 1.0
+    w: float = 1.0
+    between: tuple[float, float] | None = None
+    """Arc lengths between which the rates hold; None: along the whole ridge."""
+    shown: bool = True
+
+    @cached_property
+    def ridge(self) -> Ridge:
+        """As it is with these rates."""
+        if (self.h, self.w) == (1.0, 1.0):
+            return self.registered
+        return self.registered.resized(h=self.h, w=self.w, between=self.between)
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """The ridges of one scan, and which of them is chosen; every change is a new one."""
+
+    features: tuple[Feature, ...] = ()
+    chosen: str | None = None
+
+    def __getitem__(self, name: str) -> Feature:
+        for feature in self.features:
+            if feature.name == name:
+                return feature
+        raise ValueError(
+            f"ridge: expected one of {', '.join(f.name for f in self.features) or 'none'}, got {name!r}; "
+            "choose one of them"
+        )
+
+    def added(self, registered: Ridge, pick: tuple[float, float, float]) -> Session:
+        """With one more ridge, chosen, by the first free name."""
+        taken = {f.name for f in self.features}
+        what = "groove" if registered.groove else "ridge"
+        name = next(n for n in (f"{what} {k}" for k in count(1)) if n not in taken)
+        return Session((*self.features, Feature(name, registered, pick)), name)
+
+    def changed(self, name: str, /, **values: object) -> Session:
+        """With other values of one ridge. Raises ValueError where a rate is out of reach."""
+        for rate in ("h", "w"):
+            if rate in values and not LEAST <= float(str(values[rate])) <= MOST:
+                raise ValueError(
+                    f"{rate}: expected a rate from {LEAST:g} to {MOST:g}, got {values[rate]}; give another"
+                )
+        new = replace(self[name], **values)  # type: ignore[arg-type]
+        return replace(self, features=tuple(new if f.name == name else f for f in self.features))
+
+    def renamed(self, name: str, to: str) -> Session:
+        """With another name for one ridge. Raises ValueError where it is empty or taken."""
+        to = to.strip()
+        if not to or (to != name and any(f.name == to for f in self.features)):
+            raise ValueError(f"name: expected one that no other ridge has, got {to!r}; give another")
+        changed = self.changed(name, name=to)
+        return replace(changed, chosen=to if self.chosen == name else self.chosen)
+
+    def without(self, name: str) -> Session:
+        """Without one ridge; the one before it is chosen then."""
+        at = self.features.index(self[name])
+        left = self.features[:at] + self.features[at + 1 :]
+        if self.chosen != name:
+            return Session(left, self.chosen)
+        return Session(left, left[max(at - 1, 0)].name if left else None)
+
+    def choosing(self, name: str | None) -> Session:
+        """With another one chosen, or none."""
+        return replace(self, chosen=None if name is None else self[name].name)
+
+
+@dataclass
+class History:
+    """Sessions before and after the one at hand. Steps of one kind in a row, as of a slider, are one."""
+
+    now: Session = field(default_factory=Session)
+    before: list[Session] = field(default_factory=list)
+    after: list[Session] = field(default_factory=list)
+    _kind: str = ""
+
+    def do(self, session: Session, kind: str = "") -> None:
+        """Go on to a session; kind: of the step, "" for one that stands for itself."""
+        if not kind or kind != self._kind:
+            self.before.append(self.now)
+        self._kind = kind
+        self.now = session
+        self.after.clear()
+
+    def undo(self) -> bool:
+        """Go back one step; whether there was one."""
+        return self._step(self.before, self.after)
+
+    def redo(self) -> bool:
+        """Take back an undo; whether there was one."""
+        return self._step(self.after, self.before)
+
+    def _step(self, source: list[Session], target: list[Session]) -> bool:
+        if not source:
+            return False
+        target.append(self.now)
+        self.now, self._kind = source.pop(), ""
+        return True
