@@ -116,6 +116,39 @@ def export(feature: Path, output: Path, h: float | None, w: float | None, name: 
 
 
 @main.command()
+@click.argument("scan", type=_FILE, required=False)
+@click.option("--unit", metavar="UNIT", help="Length unit of SCAN.  [default: what the format says, else mm]")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port.  [default: a free one]"
+)
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    metavar="ADDRESS",
+    help="Address to listen at: who can reach it and has the token may use the page.",
+)
+@click.option(
+    "--upload",
+    type=click.IntRange(1),
+    default=1024,
+    show_default=True,
+    metavar="MB",
+    help="Size of the largest file that may be sent to the page.",
+)
+@click.option("--no-browser", is_flag=True, help="Open no browser; print the address only.")
+def view(scan: Path | None, unit: str | None, port: int, host: str, upload: int, no_browser: bool) -> None:
+    """Look at SCAN on a web page: click on a ridge, slide its height and width, take it away.
+
+    The page is served on this machine alone until Ctrl-C. SCAN may also be dropped on the page; a page saved
+    there is opened like a scan.
+    """
+    from ridgefeature.commands.view import run
+
+    run(scan, unit, host, port, upload, not no_browser)
+
+
+@main.command()
 @click.argument("file", type=_FILE)
 @click.option("--unit", metavar="UNIT", help="Length unit of a scan.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")

@@ -8,11 +8,12 @@ import numpy as np
 import vtkmodules.vtkInteractionStyle
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (makes the renderer)
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import (
     vtkActor,
+    vtkCamera,
+    vtkCellPicker,
     vtkPolyDataMapper,
     vtkRenderer,
     vtkRenderWindow,
@@ -23,72 +24,128 @@ from ridgefeature.curvilinear import crest
 from ridgefeature.plot.marks import outline
 from ridgefeature.ridge import Ridge
 from ridgefeature.template import Template
+from ridgefeature.viewer.colours import Pixels, by_height, plane_axes
 from ridgefeature.viewer.picking import picked, thinned
+from ridgefeature.viewer.polydata import line, move, quads, triangles, vertices
 
 Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
-STILL, MOVING = 400_000, 60_000
-"""Most scan points that are drawn at rest, and while the view turns: all others are there for the fit."""
+STILL, MOVING = 400_000, 40_000
+"""Most scan points that are drawn at rest, and while something moves: all others are there for the fit."""
 _SURFACE, _CHOSEN, _CREST, _TEMPLATE = (
     (0.75, 0.55, 0.25),
     (0.96, 0.62, 0.04),
     (0.86, 0.15, 0.15),
-    (0.1, 0.1, 0.1),
+    (0.15, 0.45, 0.95),
 )
+_PART = (0.72, 0.76, 0.8)
 _ACROSS, _A_STATION = 31, 2
+_LIGHT, _DARK = (1.0, 1.0, 1.0), (0.09, 0.1, 0.12)
 
 
 class Scene:
-    """Actors by name in one renderer; the camera is VTK's."""
+    """Actors by name in one renderer; the camera is VTK's, without perspective."""
 
     def __init__(self) -> None:
         self.renderer, self.window = vtkRenderer(), vtkRenderWindow()
         self.window.SetOffScreenRendering(1)
+        self.window.SetMultiSamples(0)  # without a graphics card, points take thrice the time with them
+        self.window.SetSize(900, 500)
         self.window.AddRenderer(self.renderer)
         self.interactor = vtkRenderWindowInteractor()
         self.interactor.SetRenderWindow(self.window)
         self.interactor.GetInteractorStyle().SetCurrentStyleToTrackballCamera()
-        self.points: Array = np.empty((0, 3))
+        self.renderer.GetActiveCamera().ParallelProjectionOn()
+        self.still: Array = np.empty((0, 3))
+        """(m, 3) those points of the scan that are drawn at rest."""
         self._actors: dict[str, vtkActor] = {}
-        self.interactor.AddObserver("StartInteractionEvent", lambda *_: self._coarse(True))
-        self.interactor.AddObserver("EndInteractionEvent", lambda *_: self._coarse(False))
+        self._camera: vtkCamera | None = None
+        self.interactor.AddObserver("StartInteractionEvent", lambda *_: self.coarse(True))
+        self.interactor.AddObserver("EndInteractionEvent", lambda *_: self.coarse(False))
+        self.dark(False)
 
-    def show_points(self, points: Array, colours: Pixels) -> None:
-        """The scan (n, 3) and its colours (n, 3); the camera looks at all of it."""
-        self.points = points
+    def dark(self, dark: bool) -> None:
+        """A dark background, or a light one."""
+        self.renderer.SetBackground(*(_DARK if dark else _LIGHT))
+
+    def show_points(self, points: Array) -> None:
+        """The scan (n, 3), by height; nothing else is shown any more, and the camera looks at all of it."""
         self.renderer.RemoveAllViewProps()
         self._actors.clear()
-        for name, most in (("still", STILL), ("moving", MOVING)):
-            kept = thinned(len(points), most)
-            data = _vertices(points[kept])
-            data.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(colours[kept]), deep=True))
-            look = self._show(name, data).GetProperty()
+        self.still = points[thinned(len(points), STILL)]
+        for name, own in (("still", self.still), ("moving", self._few(self.still))):
+            look = self._show(name, vertices(own)).GetProperty()
             look.LightingOff()
-            look.SetPointSize(2.0 if len(kept) > 50_000 else 3.0)
-        self._coarse(False)
-        self.fit()
+            look.SetPointSize(2.0 if len(self.still) > 50_000 else 3.0)
+        self.coarse(False)
+        self.paint(by_height(self.still))
+        self.from_above()
 
-    def paint_points(self, colours: Pixels) -> None:
-        """Other colours (n, 3) for the scan."""
-        for name, most in (("still", STILL), ("moving", MOVING)):
+    def paint(self, colours: Pixels) -> None:
+        """Other colours (m, 3) for the points that are drawn."""
+        for name, own in (("still", colours), ("moving", self._few(colours))):
             if name in self._actors:
                 data = self._actors[name].GetMapper().GetInput().GetPointData()
-                kept = thinned(len(self.points), most)
-                data.SetScalars(numpy_to_vtk(np.ascontiguousarray(colours[kept]), deep=True))
+                data.SetScalars(numpy_to_vtk(np.ascontiguousarray(own), deep=True))
+
+    def _few(self, rows: NDArray[Any]) -> NDArray[Any]:
+        return rows[thinned(len(rows), MOVING)]
 
     def show_ridge(self, name: str, ridge: Ridge, chosen: bool) -> None:
         """Its surface and crest; a surface of the same size only gets other points."""
         grid = ridge.surface().grid(_A_STATION * len(ridge.arc_length), _ACROSS)
-        surface, line = f"surface {name}", f"crest {name}"
+        surface = f"surface {name}"
         known = self._actors.get(surface)
         if known is not None and known.GetMapper().GetInput().GetNumberOfPoints() == grid[..., 0].size:
-            _move(known, grid.reshape(-1, 3))
+            move(known, grid.reshape(-1, 3))
         else:
-            self._show(surface, _quads(grid))
+            self._show(surface, quads(grid))
         look = self._actors[surface].GetProperty()
         look.SetColor(*(_CHOSEN if chosen else _SURFACE))
-        look.SetOpacity(0.85)
-        self._line(line, crest(ridge), _CREST, 3.0)
+        look.SetOpacity(0.9)
+        look.SetAmbient(0.35)
+        look.SetDiffuse(0.65)
+        self._line(f"crest {name}", crest(ridge), _CREST, 3.0)
+
+    def hide_ridge(self, name: str) -> None:
+        for own in (f"surface {name}", f"crest {name}"):
+            self._drop(own)
+
+    def show_part(self, points: Array, corners: NDArray[np.int64], grown: NDArray[np.int64]) -> None:
+        """A solid: triangles (m, 3) of its own, and of a ridge on it (k, 3). All else is hidden."""
+        for name, own, colour in (("part", corners, _PART), ("part ridge", grown, _CHOSEN)):
+            look = self._show(name, triangles(points, own)).GetProperty()
+            look.SetColor(*colour)
+            look.SetSpecular(0.2)
+        self.only_part(True)
+
+    def pick_part(self, across: float, down: float) -> Array | None:
+        """The place (3,) on the solid under a place on the screen, as for `pick`."""
+        picker = vtkCellPicker()
+        picker.PickFromListOn()
+        for name in ("part", "part ridge"):
+            if name in self._actors:
+                picker.AddPickList(self._actors[name])
+        width, height = self.window.GetSize()
+        hit = picker.Pick(across * width, (1.0 - down) * height, 0.0, self.renderer)
+        return np.array(picker.GetPickPosition()) if hit else None
+
+    def keep_camera(self) -> None:
+        """Remember where the camera is."""
+        self._camera = vtkCamera()
+        self._camera.DeepCopy(self.renderer.GetActiveCamera())
+
+    def restore_camera(self) -> None:
+        """Put it back there."""
+        if self._camera is not None:
+            self.renderer.GetActiveCamera().DeepCopy(self._camera)
+            self.renderer.ResetCameraClippingRange()
+
+    def only_part(self, only: bool) -> None:
+        """Show nothing but the solid, or all but it."""
+        for name, actor in self._actors.items():
+            actor.SetVisibility(name.startswith("part") == only)
+        if not only:
+            self.coarse(False)
 
     def show_template(self, template: Template, number: int) -> None:
         self._line(f"template {number}", outline(template), _TEMPLATE, 1.5)
@@ -96,9 +153,9 @@ class Scene:
     def mark(self, place: Array | None, name: str = "mark", size: float = 10.0) -> None:
         """A dot at a place (3,); None: no dot."""
         if place is None:
-            self.hide(name)
+            self._drop(name)
             return
-        look = self._show(name, _vertices(np.asarray(place, dtype=float)[None])).GetProperty()
+        look = self._show(name, vertices(np.asarray(place, dtype=float)[None])).GetProperty()
         look.SetPointSize(size)
         look.SetColor(*_CREST)
         look.LightingOff()
@@ -107,102 +164,97 @@ class Scene:
     def hide(self, prefix: str) -> None:
         """All whose names begin so."""
         for name in [n for n in self._actors if n.startswith(prefix)]:
+            self._drop(name)
+
+    def _drop(self, name: str) -> None:
+        if name in self._actors:
             self.renderer.RemoveActor(self._actors.pop(name))
 
     def names(self) -> list[str]:
         return sorted(self._actors)
 
     def fit(self) -> None:
-        """Look at all that is there."""
+        """Look at all that is there, from where the camera is."""
         self.renderer.ResetCamera()
 
-    def pick(self, x: float, y: float) -> int | None:
-        """The number of the scan point under a place on the screen, in pixels from the lower left."""
+    def from_above(self) -> None:
+        """Look down on the scan's best plane, a little from the side; its longer way is across."""
+        if not len(self.still):
+            return
+        axes = plane_axes(self.still)
+        eye = 0.9 * axes[2] - 0.45 * axes[1]
+        camera, middle = self.renderer.GetActiveCamera(), self.still.mean(axis=0)
+        camera.SetFocalPoint(*middle)
+        camera.SetPosition(*(middle + eye))
+        camera.SetViewUp(*axes[1])
+        self.fit()
+
+    def turn(self, azimuth: float, elevation: float) -> None:
+        """Orbit by so many degrees."""
+        camera = self.renderer.GetActiveCamera()
+        camera.Azimuth(azimuth)
+        camera.Elevation(elevation)
+        camera.OrthogonalizeViewUp()
+        self.renderer.ResetCameraClippingRange()
+
+    def zoom(self, factor: float) -> None:
+        self.renderer.GetActiveCamera().Zoom(factor)
+
+    def pan(self, right: float, up: float) -> None:
+        """Move the view by parts of the picture's height."""
+        camera = self.renderer.GetActiveCamera()
+        above, away = np.array(camera.GetViewUp()), np.array(camera.GetDirectionOfProjection())
+        aside = np.cross(away, above)
+        shift = 2.0 * camera.GetParallelScale() * (right * aside / np.linalg.norm(aside) + up * above)
+        camera.SetFocalPoint(*(np.array(camera.GetFocalPoint()) + shift))
+        camera.SetPosition(*(np.array(camera.GetPosition()) + shift))
+        self.renderer.ResetCameraClippingRange()
+
+    def length_of_pixel(self) -> float:
+        """In the scan's unit: the same all over the picture."""
+        return float(
+            2.0 * self.renderer.GetActiveCamera().GetParallelScale() / max(self.window.GetSize()[1], 1)
+        )
+
+    def pick(self, across: float, down: float, coarsely: bool = False) -> Array | None:
+        """The scan point (3,) under a place on the screen, in parts of the picture from its upper left.
+
+        coarsely: only points that are drawn while something moves are looked at.
+        """
         camera = self.renderer.GetActiveCamera()
         self.renderer.ResetCameraClippingRange()
         width, height = self.window.GetSize()
         matrix = camera.GetCompositeProjectionTransformMatrix(width / max(height, 1), -1.0, 1.0)
         own = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
-        return picked(self.points, own, (width, height), (x, y))
+        points = self._few(self.still) if coarsely else self.still
+        found = picked(points, own, (width, height), (across * width, (1.0 - down) * height))
+        return None if found is None else points[found]
 
     def on_screen(self, place: Array) -> tuple[float, float]:
-        """Where a place (3,) of the scan is seen, in pixels from the lower left."""
+        """Where a place (3,) of the scan is seen, in parts of the picture from its upper left."""
         self.renderer.SetWorldPoint([*map(float, place), 1.0])
         self.renderer.WorldToDisplay()
         x, y, _ = self.renderer.GetDisplayPoint()
-        return float(x), float(y)
+        width, height = self.window.GetSize()
+        return float(x) / width, 1.0 - float(y) / height
 
-    def _coarse(self, moving: bool) -> None:
+    def coarse(self, moving: bool) -> None:
+        """Draw few points, as long as something moves, or all."""
         for name, shown in (("still", not moving), ("moving", moving)):
             if name in self._actors:
                 self._actors[name].SetVisibility(shown)
 
-    def _line(self, name: str, line: Array, colour: tuple[float, float, float], width: float) -> None:
-        data = _vertices(line)
-        data.SetVerts(vtkCellArray())
-        cells = vtkCellArray()
-        cells.InsertNextCell(len(line), list(range(len(line))))
-        data.SetLines(cells)
-        look = self._show(name, data).GetProperty()
+    def _line(self, name: str, places: Array, colour: tuple[float, float, float], width: float) -> None:
+        look = self._show(name, line(places)).GetProperty()
         look.SetColor(*colour)
         look.SetLineWidth(width)
         look.LightingOff()
 
     def _show(self, name: str, data: vtkPolyData) -> vtkActor:
-        self.hide(name)
+        self._drop(name)
         mapper, actor = vtkPolyDataMapper(), vtkActor()
         mapper.SetInputData(data)
         actor.SetMapper(mapper)
         self.renderer.AddActor(actor)
         self._actors[name] = actor
         return actor
-
-
-def by_height(points: Array) -> Pixels:
-    """Colours (n, 3) by height over the plane of least squares, from the lowest to the highest 1 %."""
-    centred = points - points.mean(axis=0)
-    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
-    normal = normal * (np.sign(normal[np.argmax(np.abs(normal))]) or 1.0)
-    return ramp(centred @ normal)
-
-
-def ramp(values: Array) -> Pixels:
-    """Colours (n, 3) from violet over green to yellow, from the lowest to the highest 1 %; grey where NaN."""
-    out = np.full((len(values), 3), 190, dtype=np.uint8)
-    known = np.isfinite(values)
-    if known.any():
-        low, high = np.quantile(values[known], [0.01, 0.99])
-        part = np.clip((values[known] - low) / max(high - low, 1e-300), 0.0, 1.0)
-        stops = np.array([[68, 1, 84], [49, 104, 142], [53, 183, 121], [253, 231, 37]], dtype=float)
-        at = np.linspace(0.0, 1.0, len(stops))
-        out[known] = np.column_stack([np.interp(part, at, c) for c in stops.T]).round().astype(np.uint8)
-    return out
-
-
-def _vertices(points: Array) -> vtkPolyData:
-    data, places, cells = vtkPolyData(), vtkPoints(), vtkCellArray()
-    places.SetData(numpy_to_vtk(np.ascontiguousarray(points, dtype=float), deep=True))
-    data.SetPoints(places)
-    cells.SetData(1, numpy_to_vtkIdTypeArray(np.arange(len(points), dtype=np.int64), deep=True))
-    data.SetVerts(cells)
-    return data
-
-
-def _quads(grid: Array) -> vtkPolyData:
-    nu, nv = grid.shape[:2]
-    index = np.arange(nu * nv).reshape(nu, nv)
-    corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
-    data = _vertices(grid.reshape(-1, 3))
-    data.SetVerts(vtkCellArray())
-    cells = vtkCellArray()
-    ravelled = np.stack([c.ravel() for c in corners], axis=1).ravel()
-    cells.SetData(4, numpy_to_vtkIdTypeArray(np.ascontiguousarray(ravelled, dtype=np.int64), deep=True))
-    data.SetPolys(cells)
-    return data
-
-
-def _move(actor: Any, points: Array) -> None:
-    """Other places for the points of what an actor shows."""
-    held = actor.GetMapper().GetInput().GetPoints()
-    vtk_to_numpy(held.GetData())[:] = points
-    held.Modified()

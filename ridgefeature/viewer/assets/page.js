@@ -1,0 +1,90 @@
+// What a page's markup cannot say: clicks and drags on the view and the curves, keys, dropped files.
+(() => {
+  const tell = (name, ...args) => window.trame && window.trame.trigger(name, args);
+  const part = (event, element) => {
+    const box = element.getBoundingClientRect();
+    return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  };
+  const on = (event, selector) => event.target instanceof Element && event.target.closest(selector);
+
+  // The view: a press and release at one place is a click, all else turns the camera.
+  let pressed = null;
+  document.addEventListener("pointerdown", (e) => {
+    pressed = on(e, "#view") && e.button === 0 ? [e.clientX, e.clientY] : null;
+  }, true);
+  document.addEventListener("pointerup", (e) => {
+    const view = on(e, "#view");
+    if (view && pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) tell("click", ...part(e, view));
+    pressed = null;
+  }, true);
+  let hovered = 0;
+  document.addEventListener("pointermove", (e) => {
+    const view = on(e, "#view");
+    if (!view || e.buttons || Date.now() - hovered < 90) return;
+    hovered = Date.now();
+    tell("hover", ...part(e, view));
+  }, true);
+
+  // The curves: pointing marks the place, dragging chooses a stretch.
+  let from = null;
+  document.addEventListener("pointerdown", (e) => { const plot = on(e, ".plot"); from = plot ? part(e, plot)[0] : null; });
+  document.addEventListener("pointermove", (e) => {
+    const plot = on(e, ".plot");
+    if (plot && Date.now() - hovered >= 50) { hovered = Date.now(); tell("point", part(e, plot)[0]); }
+  });
+  document.addEventListener("pointerup", (e) => {
+    const plot = on(e, ".plot");
+    if (plot && from !== null && Math.abs(part(e, plot)[0] - from) > 0.02) tell("stretch", from, part(e, plot)[0]);
+    from = null;
+  });
+
+  // Keys. In fields they write, and elsewhere they act.
+  const view_keys = {
+    ArrowLeft: ["turn", -6, 0], ArrowRight: ["turn", 6, 0], ArrowUp: ["turn", 0, 6], ArrowDown: ["turn", 0, -6],
+    "+": ["zoom", 1.15], "=": ["zoom", 1.15], "-": ["zoom", 0.87], Enter: ["click", 0.5, 0.5],
+  };
+  const shifted = {
+    ArrowLeft: ["pan", -0.05, 0], ArrowRight: ["pan", 0.05, 0], ArrowUp: ["pan", 0, 0.05], ArrowDown: ["pan", 0, -0.05],
+  };
+  const anywhere = { f: ["fit"], d: ["theme"], Escape: ["stop"], "?": ["help"], Delete: ["remove"] };
+  document.addEventListener("keydown", (e) => {
+    if (e.ctrlKey || e.metaKey) {
+      const act = { z: e.shiftKey ? "redo" : "undo", y: "redo", Z: "redo" }[e.key];
+      if (act && !on(e, "input[type=number], input[type=text]")) { tell(act); e.preventDefault(); }
+      if (e.key === "o") { document.querySelector("#file")?.click(); e.preventDefault(); }
+      return;
+    }
+    if (on(e, "#view")) {
+      const act = (e.shiftKey && shifted[e.key]) || view_keys[e.key];
+      if (act) { tell(...act); e.preventDefault(); e.stopPropagation(); return; }
+    }
+    if (on(e, ".plot") && (e.key === "ArrowLeft" || e.key === "ArrowRight")) {
+      tell("step", e.key === "ArrowLeft" ? -1 : 1); e.preventDefault(); return;
+    }
+    if (!on(e, "input, select, textarea") && anywhere[e.key]) tell(...anywhere[e.key]);
+  }, true);
+
+  // Files: dropped on the page, or chosen.
+  const send = async (file) => {
+    if (!file) return;
+    tell("sending", file.name, file.size);
+    let answer = null;
+    try {
+      const where = "/open?name=" + encodeURIComponent(file.name) + "&for=" + (window.ridgeOpens || "scan");
+      answer = await fetch(where, { method: "POST", body: file });
+    } catch (error) { tell("failed", `${file.name}: it could not be sent (${error.message})`); return; }
+    if (!answer.ok) tell("failed", await answer.text());
+  };
+  window.ridgeSend = send;
+  document.addEventListener("dragover", (e) => { e.preventDefault(); document.body.classList.add("dropping"); });
+  document.addEventListener("dragleave", (e) => { if (!e.relatedTarget) document.body.classList.remove("dropping"); });
+  document.addEventListener("drop", (e) => {
+    e.preventDefault(); document.body.classList.remove("dropping"); send(e.dataTransfer.files[0]);
+  });
+  document.addEventListener("change", (e) => {
+    if (e.target.matches?.("#file, #host-file")) {
+      window.ridgeOpens = e.target.id === "file" ? "scan" : "host";
+      send(e.target.files[0]); e.target.value = ""; window.ridgeOpens = "scan";
+    }
+  });
+})();

@@ -1,0 +1,282 @@
+"""What is done on the page at once: each thing is one function here, and what it changes is told to the page.
+
+The page's markup is in `layout`; what is open, in `session`; what is seen, in `scene`; what takes long, in
+`work`. All of this runs in the server's own thread: VTK wants one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.diagnosis import Diagnosis
+from ridgefeature.readable import ends, kind, number, templates
+from ridgefeature.readable import rows as trust
+from ridgefeature.scan import Scan
+from ridgefeature.viewer import curves
+from ridgefeature.viewer.colours import by_deviation, by_height
+from ridgefeature.viewer.pointing import Pointing
+from ridgefeature.viewer.scene import Scene
+from ridgefeature.viewer.session import LEAST, MOST, Feature, History, Session
+
+Array = NDArray[np.float64]
+HINT = "Click on a ridge to register it. Drag turns, the wheel zooms, Shift with drag pans."
+TOLD: dict[str, Any] = {
+    "scan_name": "", "scan_note": "", "unit": "mm", "hint": "", "bad": False, "busy": "", "count": 0,
+    "ridges": [], "chosen": "", "h": 1.0, "w": 1.0, "rows": [], "profile": "", "section": "", "place": -1.0,
+    "stretch": "", "can_undo": False, "can_redo": False, "colouring": "height", "dark": False,
+    "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "height": "",
+    "width": "", "pasting": False, "host": "plane", "part_note": "", "host_name": "",
+}  # fmt: skip
+"""What the page knows, and how it begins."""
+
+
+class Page:
+    """One page. tell: state of trame that the page sees; draw: sends a new picture to it."""
+
+    def __init__(self, tell: Any, scene: Scene, draw: Callable[[], None]) -> None:
+        self.tell, self.scene, self.draw = tell, scene, draw
+        self.scan: Scan | None = None
+        self.history = History()
+        self.found: dict[int, Diagnosis] = {}
+        """By id of a registered ridge, what its scan tells of it."""
+        self.pointing = Pointing(tell, scene)
+        self._shown: set[str] = set()
+
+    @property
+    def session(self) -> Session:
+        return self.history.now
+
+    @property
+    def feature(self) -> Feature | None:
+        """The ridge that is chosen."""
+        return None if self.session.chosen is None else self.session[self.session.chosen]
+
+    # What is open.
+
+    def show_scan(self, scan: Scan, name: str, session: Session | None = None) -> None:
+        """Another scan, with the ridges that were found in it."""
+        self.scan, self.history = scan, History(session or Session())
+        self.pointing.clear()
+        self.found.clear()
+        self._shown.clear()
+        self.scene.show_points(scan.points)
+        few = "" if len(self.scene.still) == len(scan) else f", {len(self.scene.still):,} of them drawn"
+        size = " x ".join(number(x, 3) for x in np.ptp(scan.bounds, axis=0))
+        self.tell.scan_name, self.tell.unit = name, scan.unit
+        self.tell.scan_note = f"{len(scan):,} points{few}, {size} {scan.unit}"
+        self.tell.colouring, self.tell.pasting = "height", False
+        self.say(HINT)
+        self.refresh()
+
+    def do(self, session: Session, kind: str = "") -> None:
+        """Go on to another session, as `History.do`, and show it."""
+        self.history.do(session, kind)
+        self.refresh()
+
+    def undo(self) -> None:
+        if self.history.undo():
+            self.refresh()
+
+    def redo(self) -> None:
+        if self.history.redo():
+            self.refresh()
+
+    def choose(self, name: str) -> None:
+        self.history.now = self.session.choosing(name)
+        self.refresh()
+
+    def toggle(self, name: str) -> None:
+        """Show a ridge, or hide it."""
+        self.do(self.session.changed(name, shown=not self.session[name].shown))
+
+    def remove(self, name: str | None = None) -> None:
+        """Leave out one ridge, by default the chosen one."""
+        name = name or self.session.chosen
+        if name is not None:
+            self.do(self.session.without(name))
+
+    def rename(self, name: str, to: str) -> None:
+        self.do(self.session.renamed(name, to))
+
+    # Height and width.
+
+    def slide(self, rate: str, value: float) -> None:
+        """Another rate, "h" or "w", for the chosen ridge or its stretch; a slider's steps are one undo."""
+        if self.session.chosen is not None and rate in ("h", "w"):
+            name = self.session.chosen
+            self.history.do(self.session.changed(name, **{rate: float(value)}), f"{rate} of {name}")
+            if not self.tell.pasting:
+                self.scene.coarse(True)
+            self.refresh()
+
+    def absolute(self, what: str, value: float) -> None:
+        """Another largest "height" or width of the chosen ridge, in the scan's unit."""
+        feature = self.feature
+        if feature is not None and what in ("height", "width"):
+            usual = _largest(getattr(feature.registered, what))
+            self.slide(what[0], float(value) / usual)
+
+    def rest(self) -> None:
+        """Nothing moves any more: all points are drawn."""
+        if not self.tell.pasting:
+            self.scene.coarse(False)
+        self.draw()
+
+    def reset(self) -> None:
+        """The chosen ridge as it was registered."""
+        if self.session.chosen is not None:
+            self.do(self.session.changed(self.session.chosen, h=1.0, w=1.0, between=None))
+
+    def stretch(self, first: float, last: float) -> None:
+        """The rates hold between two places of the curves, in parts of their width; all along if alike."""
+        feature = self.feature
+        if feature is None:
+            return
+        length = feature.registered.length
+        places = [curves.place_of(x, length) for x in sorted((first, last))]
+        low, high = (x if x is not None else e for x, e in zip(places, (0.0, length), strict=True))
+        try:
+            feature.registered.resized(h=1.1, between=(low, high))
+        except ValueError as error:
+            self.say(str(error), bad=True)
+            return
+        self.do(self.session.changed(feature.name, between=(low, high)))
+
+    def whole(self) -> None:
+        """The rates hold along the whole ridge."""
+        if self.session.chosen is not None:
+            self.do(self.session.changed(self.session.chosen, between=None))
+
+    # What is seen.
+
+    def hover(self, across: float, down: float) -> None:
+        """As `Pointing.hover`."""
+        self.pointing.hover(self.feature, across, down)
+        self.draw()
+
+    def point(self, part: float) -> None:
+        """As `Pointing.point`."""
+        if self.feature is not None:
+            self.pointing.point(self.feature, part)
+            self.draw()
+
+    def step(self, way: int) -> None:
+        """As `Pointing.step`."""
+        if self.feature is not None:
+            self.pointing.step(self.feature, way)
+            self.draw()
+
+    def colour(self, by: str) -> None:
+        """Points by "height" or by "deviation" from the chosen ridge, as it was registered."""
+        feature, points = self.feature, self.scene.still
+        if by == "deviation" and feature is not None:
+            self.scene.paint(by_deviation(feature.registered.distance(points)))
+        elif len(points):
+            by = "height"
+            self.scene.paint(by_height(points))
+        self.tell.colouring = by
+        self.draw()
+
+    def theme(self) -> None:
+        """Dark, or light."""
+        self.tell.dark = not self.tell.dark
+        self.scene.dark(self.tell.dark)
+        self.draw()
+
+    def look(self, how: str, *values: float) -> None:
+        """Move the camera: "fit", "turn", "zoom" or "pan"."""
+        moves: dict[str, Callable[..., None]] = {
+            "fit": self.scene.fit,
+            "turn": self.scene.turn,
+            "zoom": self.scene.zoom,
+            "pan": self.scene.pan,
+        }
+        moves[how](*map(float, values))
+        self.draw()
+        self.scale()
+
+    def scale(self) -> None:
+        """Tell how long the scale bar is, in pixels, and what that is."""
+        pixel = self.scene.length_of_pixel()
+        length = _round(110.0 * pixel)
+        self.tell.bar, self.tell.bar_text = length / pixel, f"{number(length)} {self.tell.unit}"
+
+    def say(self, text: str, bad: bool = False) -> None:
+        self.tell.hint, self.tell.bad = text, bad
+
+    def refresh(self) -> None:
+        """Show the session as it is: ridges, sliders, curves, table."""
+        session, tell = self.session, self.tell
+        names = {f.name for f in session.features if f.shown}
+        for name in self._shown - names:
+            self.scene.hide_ridge(name)
+        for feature in session.features:
+            if feature.shown:
+                self.scene.show_ridge(feature.name, feature.ridge, feature.name == session.chosen)
+        self._shown = names
+        if tell.pasting:
+            self.scene.only_part(True)
+        tell.ridges = [{"name": f.name, "shown": f.shown} for f in session.features]
+        tell.chosen = session.chosen or ""
+        tell.can_undo, tell.can_redo = bool(self.history.before), bool(self.history.after)
+        self._tell_feature()
+        self.draw()
+        self.scale()
+
+    def _tell_feature(self) -> None:
+        feature, tell = self.feature, self.tell
+        if feature is None:
+            tell.rows, tell.profile, tell.section, tell.place, tell.stretch = [], "", "", -1.0, ""
+            self.scene.mark(None, "place")
+            return
+        ridge = feature.ridge
+        tell.h, tell.w = feature.h, feature.w
+        tell.height, tell.width = (f"{_largest(x):.5g}" for x in (ridge.height, ridge.width))
+        low, high = feature.between or (0.0, ridge.length)
+        tell.stretch = "" if feature.between is None else f"s = {number(low)} to {number(high)} {ridge.unit}"
+        tell.profile = curves.profile(ridge, feature.between)
+        tell.rows = [{"name": name, "value": value} for name, value in self._rows(feature)]
+        self.pointing.show(feature, self.pointing.place(feature))
+
+    def _rows(self, feature: Feature) -> list[tuple[str, str]]:
+        ridge, unit = feature.ridge, feature.ridge.unit
+        spans = [(name, f"{number(float(x.min()))} to {number(float(x.max()))} {unit}")
+                 for name, x in (("height h", ridge.height), ("width w", ridge.width))]  # fmt: skip
+        found = self.found.get(id(feature.registered))
+        return [
+            ("kind", kind(ridge)),
+            ("length", f"{number(ridge.length)} {unit}"),
+            *spans,
+            ("section", ridge.section.told_name),
+            ("templates", templates(ridge)),
+            *(ends(ridge) if found is None else trust(feature.registered, found)),
+        ]
+
+    def triggers(self) -> dict[str, Callable[..., None]]:
+        """All that is done at once, by the name that the page calls it."""
+        own = (
+            self.undo, self.redo, self.choose, self.toggle, self.remove, self.rename, self.slide,
+            self.absolute, self.rest, self.reset, self.stretch, self.whole, self.hover, self.point, self.step,
+            self.colour, self.theme,
+        )  # fmt: skip
+        moves = {how: partial(self.look, how) for how in ("fit", "turn", "zoom", "pan")}
+        return {**{f.__name__: f for f in own}, **moves, "help": self._help}
+
+    def _help(self) -> None:
+        self.tell.help = not self.tell.help
+
+
+def _largest(values: Array) -> float:
+    """The value that is farthest from 0."""
+    return float(values[np.argmax(np.abs(values))])
+
+
+def _round(length: float) -> float:
+    """1, 2 or 5 times a power of ten, no longer than this."""
+    power = 10.0 ** np.floor(np.log10(max(length, 1e-300)))
+    return float(max(k * power for k in (1, 2, 5) if k * power <= length * (1 + 1e-9)))

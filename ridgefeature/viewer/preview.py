@@ -1,0 +1,105 @@
+"""A ridge pasted on a part: the solid, and its triangles for the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.ridge import Ridge
+from ridgefeature.scan import millimetres_per
+
+Array = NDArray[np.float64]
+Corners = NDArray[np.int64]
+HOSTS = ("plane", "cylinder", "sphere")
+_ROOM = 1.1
+"""Size of a host's face, in that of what a ridge may need."""
+_FINE, _BEND = 4e-4, 0.15
+"""Distance of triangles from the surface, in the part's size; angle between two of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A host with a ridge on it, in millimetres."""
+
+    solid: Any
+    """cq.Solid."""
+    points: Array
+    host: Corners
+    grown: Corners
+    """(m, 3) corners of the triangles of the host's own faces, and of the ridge's."""
+    told: str
+    """Volumes and how it was made, in words."""
+
+
+def host_for(kind: str, ridge: Ridge) -> tuple[Any, Array]:
+    """A solid, one of HOSTS, with room for a ridge, and the place (3,) on it where the ridge may go.
+
+    Raises ValueError for any other kind.
+    """
+    import cadquery as cq
+
+    size = millimetres_per(ridge.unit)
+    border, height = size * float(ridge.border.max()), size * float(np.abs(ridge.height).max())
+    spine = size * ridge.spine
+    # Its middle comes to the place, and it may lead anywhere from there.
+    apart = np.linalg.norm(spine - spine[len(spine) // 2], axis=1)
+    extent = 2.0 * _ROOM * (float(apart.max()) + border)
+    if kind == "plane":
+        thick = max(0.08 * extent, 1.5 * height)
+        return cq.Workplane().box(extent, extent, thick).val(), np.array([0.0, 0.0, 0.5 * thick])
+    if kind == "cylinder":
+        radius = max(0.4 * extent, 4.0 * height)
+        return cq.Workplane().cylinder(extent, radius).val(), np.array([-radius, 0.0, 0.0])
+    if kind == "sphere":
+        radius = max(0.6 * extent, 4.0 * height)
+        return cq.Workplane().sphere(radius).val(), np.array([-radius, 0.0, 0.0])
+    raise ValueError(f"host: expected one of {', '.join(HOSTS)}, got {kind!r}; choose one")
+
+
+def host_from(path: Path) -> Any:
+    """The solid of a STEP file. Raises ValueError where there is none, or several."""
+    import cadquery as cq
+
+    import cad_export as cx
+
+    solids = cq.Shape.cast(cx.read_step(path)).Solids()
+    if len(solids) != 1:
+        raise ValueError(f"{path.name}: expected one solid to paste on, found {len(solids)}; export it alone")
+    return solids[0]
+
+
+def pasted(ridge: Ridge, host: Any, at: Array | None, h: float, w: float, check: bool = True) -> Part:
+    """The ridge on the face of a host that is nearest to a place (3,), or on its largest.
+
+    check: whether the solid is searched for self-intersections, too. Raises ValueError as `cad_export.paste`.
+    """
+    import cad_export as cx
+
+    report: dict[str, Any] = {}
+    solid = cx.paste(ridge, host, at=at, h=h, w=w, check=check, report=report)
+    grown = [face for face, _ in cx.carried_by(solid)]
+    checked = "one closed valid solid, checked for self-intersections" if check else "one closed valid solid"
+    volumes = f"{report['volume_added']:+,.4g} mm3 by the ridge, {report['volume_expected']:+,.4g} expected"
+    told = f"{checked}; {volumes}"
+    return Part(solid, *_triangles(solid, grown), told)
+
+
+def _triangles(solid: Any, grown: list[Any]) -> tuple[Array, Corners, Corners]:
+    box = solid.BoundingBox()
+    tolerance, first = _FINE * box.DiagonalLength, 0
+    solid.mesh(tolerance, _BEND)
+    places: list[Array] = []
+    corners: tuple[list[Corners], list[Corners]] = ([], [])
+    for face in solid.Faces():
+        points, triangles = face.tessellate(tolerance, _BEND)
+        places.append(np.array([p.toTuple() for p in points]).reshape(-1, 3))
+        own = any(face.wrapped.IsSame(other) for other in grown)
+        corners[own].append(np.array(triangles, dtype=np.int64).reshape(-1, 3) + first)
+        first += len(points)
+    empty = np.empty((0, 3), dtype=np.int64)
+    host, ridge = (np.concatenate(c) if c else empty for c in corners)
+    return np.concatenate(places), host, ridge

@@ -1,0 +1,152 @@
+"""The page's server: on the loopback address, for who has the token in its address."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import secrets
+import tempfile
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ridgefeature.viewer.guard import LOOPBACK, add_headers, guard
+from ridgefeature.viewer.page import TOLD, Page
+from ridgefeature.viewer.routes import routes
+from ridgefeature.viewer.scene import Scene
+from ridgefeature.viewer.work import Work
+
+UPLOAD = 2**30
+"""Bytes of the largest file that the page takes."""
+_HERE = Path(__file__).parent
+
+
+def serve(
+    scan: Path | None = None,
+    unit: str | None = None,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    upload: int = UPLOAD,
+    ready: Callable[[str], None] = print,
+    open_browser: bool = True,
+) -> None:
+    """Serve the page until it is interrupted.
+
+    scan: a file to open first; host, port: address, 0 for a free port; upload: bytes of the largest file that
+    may be sent; ready: called with the page's address, once it is there.
+    """
+    os.environ.setdefault("WSLINK_READY_MSG", "")  # which else is printed
+    from trame.app import get_server
+
+    server = get_server("ridgefeature", client_type="vue3")
+    scene, token = Scene(), secrets.token_urlsafe(24)
+    view = _markup(server, scene)
+    page = Page(server.state, scene, view.update)
+    work = Work(page, Path.cwd())
+    for name, what in _triggers(page, work).items():
+        server.controller.trigger(name)(what)
+    with tempfile.TemporaryDirectory(prefix="ridgefeature-") as folder:
+        names = LOOPBACK if host in ("127.0.0.1", "localhost", "::1") else (*LOOPBACK, host)
+
+        def bind(web: Any) -> None:
+            web.app.middlewares.append(guard(token, upload, names))
+            web.app.on_response_prepare.append(add_headers)
+            web.app.add_routes(routes(work, Path(folder), upload))
+
+        async def begun(**_: Any) -> None:
+            address = f"http://{host}:{server.port}/?token={token}"
+            ready(address)
+            if open_browser:
+                webbrowser.open(address)
+            if scan is not None:
+                await _opened(work, scan, unit)
+            await work.warm()
+
+        server.controller.on_server_bind.add(bind)
+        server.controller.on_server_ready.add_task(begun)
+        server.start(
+            host=host,
+            port=port,
+            timeout=0,
+            open_browser=False,
+            show_connection_info=False,
+            disable_logging=True,
+        )
+
+
+async def _opened(work: Work, scan: Path, unit: str | None) -> None:
+    try:
+        await work.open(scan, scan.name, unit)
+    except (ValueError, OSError) as error:
+        with work.page.tell:
+            work.page.say(str(error), bad=True)
+
+
+def _markup(server: Any, scene: Scene) -> Any:
+    """Lay the page out; returns its view."""
+    from trame.ui.html import DivLayout
+    from trame.widgets import html
+    from trame.widgets import vtk as vtk_widgets
+
+    server.state.update({**TOLD, "naming": "", "trame__title": "ridgefeature"})
+    server.enable_module(
+        {"serve": {"own": str(_HERE / "assets")}, "scripts": ["own/page.js"], "styles": ["own/page.css"]}
+    )
+    with DivLayout(server) as layout:
+        view = vtk_widgets.VtkRemoteView(
+            scene.window, ref="view", interactive_quality=70, still_quality=92, interactive_ratio=1,
+            style="width: 100%; height: 100%;",
+        )  # fmt: skip
+        markup = view.html
+        layout.root.clear()
+        text = (_HERE / "page.html").read_text(encoding="utf-8")
+        html.Div(text.replace("<!--view-->", markup))
+    return view
+
+
+def _triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
+    """All that the page may ask for. What takes long is begun, and asked for by nobody twice."""
+
+    def begin(what: Callable[..., Any]) -> Callable[..., None]:
+        def begun(*values: Any) -> None:
+            asyncio.get_running_loop().create_task(_reported(page, what, *values))
+
+        return begun
+
+    def then_pasted(what: Callable[..., None]) -> Callable[..., None]:
+        def done(*values: Any) -> None:
+            _told(page, what, *values)
+            if what in changing:
+                work.preview.again()
+
+        return done
+
+    changing = (page.slide, page.absolute, page.reset, page.stretch, page.whole, page.undo, page.redo)
+    return {
+        **{name: then_pasted(what) for name, what in page.triggers().items()},
+        "click": begin(work.click),
+        "paste": begin(work.preview.paste),
+        "leave": work.preview.leave,
+        "stop": work.stop,
+        "failed": lambda text: page.say(str(text), bad=True),
+        "sending": lambda name, size: page.say(f"Sending {name}, {int(size):,} bytes"),
+        "open": begin(work.open_by_name),
+    }
+
+
+def _told(page: Page, what: Callable[..., None], *values: Any) -> None:
+    """Done; what was wrong with it is told on the page."""
+    try:
+        what(*values)
+    except (ValueError, TypeError, KeyError) as error:
+        page.say(str(error), bad=True)
+
+
+async def _reported(page: Page, what: Callable[..., Any], *values: Any) -> None:
+    try:
+        await what(*values)
+    except (ValueError, TypeError, OSError) as error:
+        page.say(str(error), bad=True)
+    finally:
+        page.tell.flush()

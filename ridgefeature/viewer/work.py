@@ -1,0 +1,184 @@
+"""What takes long on the page: opening a file, marching. It is done in another thread, and watched."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from ridgefeature.diagnosis import diagnose
+from ridgefeature.io.read import read_scan
+from ridgefeature.registration import NoRidgeError, register
+from ridgefeature.ridge import Ridge
+from ridgefeature.synthetic import Spiral
+from ridgefeature.viewer import saved, takeaway
+from ridgefeature.viewer.marching import March
+from ridgefeature.viewer.page import HINT, Page
+from ridgefeature.viewer.part_preview import PartPreview, aside
+
+_EVERY = 0.03
+"""Seconds between two looks at what was found."""
+
+
+class Work:
+    """The long work of one page; one thing at a time. folder: the only one where files are opened by name."""
+
+    def __init__(self, page: Page, folder: Path) -> None:
+        self.page, self.folder = page, folder.resolve()
+        self.march: March | None = None
+        self.preview = PartPreview(page)
+        self._lock = asyncio.Lock()
+
+    async def warm(self) -> None:
+        """Have all compiled that a march needs, which takes a minute or two the first time of all."""
+        with self._telling("Getting ready: the first time of all this takes a minute or two"):
+            async with self._lock:
+                await aside(_rehearse)
+
+    @property
+    def busy(self) -> bool:
+        return self._lock.locked()
+
+    async def open(self, path: Path, name: str, unit: str | None = None) -> None:
+        """Open a scan or a saved page. Raises ValueError or OSError where it is none."""
+        with self._telling(f"Opening {name}"):
+            async with self._lock:
+                if path.suffix == saved.SUFFIX:
+                    scan, session = await aside(lambda: saved.load(path))
+                    if scan is None:
+                        raise ValueError(f"{name}: expected a saved page with a scan, it has none")
+                    self.page.show_scan(scan, name, session)
+                    for feature in session.features:
+                        await self._diagnose(feature.registered)
+                    self.page.refresh()
+                    return
+                scan = await aside(lambda: read_scan(path, unit=unit))
+                self.page.show_scan(scan, name)
+
+    async def open_by_name(self, name: str) -> None:
+        """Open a file of the working folder, by its path in it."""
+        path = (self.folder / name).resolve()
+        if not path.is_relative_to(self.folder):
+            self.page.say(
+                f"{name}: expected a file in {self.folder.name} or below; drop it on the page", bad=True
+            )
+            return
+        try:
+            await self.open(path, path.name)
+        except (ValueError, OSError) as error:
+            self.page.say(str(error), bad=True)
+
+    async def click(self, across: float, down: float) -> None:
+        """Register the ridge at a place on the view, in parts of the picture from its upper left.
+
+        Where a part is shown, the ridge is pasted there.
+        """
+        page = self.page
+        if page.tell.pasting:
+            await self.preview.put(across, down)
+            return
+        if page.scan is None or self.busy:
+            return
+        place = page.scene.pick(across, down)
+        if place is None:
+            page.say("There is no scan point here; click on the scan.", bad=True)
+            return
+        page.scene.mark(place, "pick", 11.0)
+        at = (float(place[0]), float(place[1]), float(place[2]))
+        self.march = March(page.scan, at, page.tell.kind)
+        with self._telling("Marching"):
+            async with self._lock:
+                await self._register(self.march)
+
+    async def _register(self, march: March) -> None:
+        page, shown = self.page, 0
+        task = asyncio.ensure_future(aside(march.run))
+        while not task.done():
+            await asyncio.wait({task}, timeout=_EVERY)
+            if len(march.templates) > shown:
+                for number, template in enumerate(march.templates[shown:], shown):
+                    page.scene.show_template(template, number)
+                shown = len(march.templates)
+                page.scene.coarse(True)
+                with page.tell:
+                    page.tell.count = shown
+                page.draw()
+        page.scene.hide("template ")
+        page.scene.coarse(False)
+        try:
+            ridge = task.result()
+        except NoRidgeError as error:
+            page.say(f"There is no ridge here: {_reason(error)}. Click on the crest of one.", bad=True)
+        except KeyboardInterrupt:
+            page.say("Stopped before a template was fitted.")
+        except ValueError as error:
+            page.say(str(error), bad=True)
+        else:
+            await self._add(ridge, march)
+        page.draw()
+
+    async def _add(self, ridge: Ridge, march: March) -> None:
+        page = self.page
+        await aside(lambda: page.pointing.points_near(ridge))
+        page.do(page.session.added(ridge, march.at))
+        stopped = " It was stopped: what was found is kept." if march.stopped else ""
+        page.say(f"{page.session.chosen}: {len(ridge.templates)} templates.{stopped} {HINT}")
+        with page.tell:
+            page.tell.busy = ""
+        await self._diagnose(ridge)
+        page.refresh()
+
+    async def _diagnose(self, ridge: Ridge) -> None:
+        scan = self.page.scan
+        if scan is not None:
+            await aside(lambda: self.page.pointing.points_near(ridge))
+            self.page.found[id(ridge)] = await aside(lambda: diagnose(ridge, scan))
+
+    def stop(self) -> None:
+        """End the march at its next template."""
+        if self.march is not None:
+            self.march.stop()
+
+    async def take(self, kind: str, name: str, folder: Path) -> Path:
+        """Write what can be taken away; "page" is the whole state. Raises ValueError as `takeaway.write`."""
+        page = self.page
+        scan, session = page.scan, page.session
+        if kind == "page":
+            stem = Path(page.tell.scan_name or "page").stem
+            path = folder / f"{takeaway.stem_of(stem)}{saved.SUFFIX}"
+            await aside(lambda: saved.save(path, scan, session))
+            return path
+        if kind == "part":
+            part = self.preview.part
+            if part is None:
+                raise ValueError("expected a part with a ridge on it, there is none; paste first")
+            return await aside(lambda: takeaway.part(part.solid, folder))
+        feature = session[name]
+        return await aside(lambda: takeaway.write(kind, feature, scan, folder))
+
+    @contextmanager
+    def _telling(self, text: str) -> Iterator[None]:
+        """Tell what is being done while it is."""
+        tell = self.page.tell
+        with tell:
+            tell.busy, tell.count, tell.bad = text, 0, False
+        try:
+            yield
+        finally:
+            with tell:
+                tell.busy = ""
+
+
+def _rehearse() -> None:
+    spiral = Spiral()
+    at = (*map(float, spiral.spine(np.array(8.0))[:2]), float(spiral.height(np.array(8.0))))
+    points = spiral.points(20_000, noise=0.1)
+    diagnose(register(points, at=at), points)
+
+
+def _reason(error: NoRidgeError) -> str:
+    """Why there is none, without what could be given in a script."""
+    return str(error).partition(";")[0]
