@@ -30,7 +30,8 @@ TOLD: dict[str, Any] = {
     "ridges": [], "chosen": "", "h": 1.0, "w": 1.0, "rows": [], "profile": "", "section": "", "place": -1.0,
     "stretch": "", "can_undo": False, "can_redo": False, "colouring": "height", "dark": False,
     "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "height": "",
-    "width": "", "pasting": False, "host": "plane", "part_note": "", "host_name": "",
+    "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane", "part_note": "",
+    "host_name": "",
 }  # fmt: skip
 """What the page knows, and how it begins."""
 
@@ -69,9 +70,9 @@ class Page:
         size = " x ".join(number(x, 3) for x in np.ptp(scan.bounds, axis=0))
         self.tell.scan_name, self.tell.unit = name, scan.unit
         self.tell.scan_note = f"{len(scan):,} points{few}, {size} {scan.unit}"
-        self.tell.colouring, self.tell.pasting = "height", False
+        self.tell.pasting = False
         self.say(HINT)
-        self.refresh()
+        self.colour("height")
 
     def do(self, session: Session, kind: str = "") -> None:
         """Go on to another session, as `History.do`, and show it."""
@@ -142,8 +143,8 @@ class Page:
         low, high = (x if x is not None else e for x, e in zip(places, (0.0, length), strict=True))
         try:
             feature.registered.resized(h=1.1, between=(low, high))
-        except ValueError as error:
-            self.say(str(error), bad=True)
+        except ValueError:
+            self.say("This stretch is too short to be changed; drag further over the curves.", bad=True)
             return
         self.do(self.session.changed(feature.name, between=(low, high)))
 
@@ -174,13 +175,20 @@ class Page:
     def colour(self, by: str) -> None:
         """Points by "height" or by "deviation" from the chosen ridge, as it was registered."""
         feature, points = self.feature, self.scene.still
-        if by == "deviation" and feature is not None:
-            self.scene.paint(by_deviation(feature.registered.distance(points)))
-        elif len(points):
-            by = "height"
-            self.scene.paint(by_height(points))
-        self.tell.colouring = by
-        self.draw()
+        if not len(points):
+            return
+        deviation = by == "deviation" and feature is not None
+        if deviation and feature is not None:
+            colouring = by_deviation(feature.registered.distance(points))
+        else:
+            colouring = by_height(points)
+        self.scene.paint(colouring.pixels)
+        self.scene.faint = deviation
+        unit = self.tell.unit
+        self.tell.legend = [f"{number(x, 3)} {unit}" for x in (colouring.low, colouring.high)]
+        self.tell.gradient = colouring.gradient
+        self.tell.colouring = "deviation" if deviation else "height"
+        self.refresh()
 
     def theme(self) -> None:
         """Dark, or light."""

@@ -73,7 +73,8 @@ class PartPreview:
         """Paste at a place on the view, in parts of the picture from its upper left."""
         place = self.page.scene.pick_part(across, down)
         if place is not None:
-            self._at = place
+            # On the ridge that is there now, the click means the host under it.
+            self._at = preview.nearest_on(self._host[2], place)
             self.again()
 
     def leave(self) -> None:
@@ -126,7 +127,7 @@ class PartPreview:
             return
         page.scene.show_part(self.part.points, self.part.host, self.part.grown)
         if fit:
-            page.scene.fit()
+            page.scene.look_at_part(self.part.points, self.part.grown)
         with page.tell:
             page.tell.part_note = self.part.told
             page.say(_STILL)

@@ -72,6 +72,16 @@ def host_from(path: Path) -> Any:
     return solids[0]
 
 
+def nearest_on(host: Any, place: Array) -> Array:
+    """The place (3,) of a host that is nearest to another (BRepExtrema_DistShapeShape)."""
+    import cadquery as cq
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+
+    vertex = cq.Vertex.makeVertex(*map(float, place))
+    found = BRepExtrema_DistShapeShape(vertex.wrapped, host.wrapped).PointOnShape2(1)
+    return np.array([found.X(), found.Y(), found.Z()])
+
+
 def pasted(ridge: Ridge, host: Any, at: Array | None, h: float, w: float, check: bool = True) -> Part:
     """The ridge on the face of a host that is nearest to a place (3,), or on its largest.
 

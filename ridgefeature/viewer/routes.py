@@ -18,7 +18,7 @@ def routes(work: Work, folder: Path, limit: int) -> list[web.RouteDef]:
     async def open_file(request: web.Request) -> web.Response:
         """A file's bytes, to be parsed as any other; ?name= tells its format."""
         name = PurePath(request.query.get("name", "").replace("\\", "/")).name
-        if not name:
+        if name in ("", ".", ".."):
             raise web.HTTPBadRequest(text="expected the file's name, got none; send ?name=scan.ply")
         with tempfile.TemporaryDirectory(dir=folder) as own:
             path = Path(own) / name

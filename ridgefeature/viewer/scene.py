@@ -9,6 +9,7 @@ import vtkmodules.vtkInteractionStyle
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (makes the renderer)
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import (
     vtkActor,
@@ -24,7 +25,7 @@ from ridgefeature.curvilinear import crest
 from ridgefeature.plot.marks import outline
 from ridgefeature.ridge import Ridge
 from ridgefeature.template import Template
-from ridgefeature.viewer.colours import Pixels, by_height, plane_axes
+from ridgefeature.viewer.colours import Pixels, plane_axes
 from ridgefeature.viewer.picking import picked, thinned
 from ridgefeature.viewer.polydata import line, move, quads, triangles, vertices
 
@@ -38,6 +39,7 @@ _SURFACE, _CHOSEN, _CREST, _TEMPLATE = (
     (0.15, 0.45, 0.95),
 )
 _PART = (0.72, 0.76, 0.8)
+_FAINT = 0.15
 _ACROSS, _A_STATION = 31, 2
 _LIGHT, _DARK = (1.0, 1.0, 1.0), (0.09, 0.1, 0.12)
 
@@ -46,6 +48,7 @@ class Scene:
     """Actors by name in one renderer; the camera is VTK's, without perspective."""
 
     def __init__(self) -> None:
+        vtkObject.GlobalWarningDisplayOff()  # without a display it says so, and goes on
         self.renderer, self.window = vtkRenderer(), vtkRenderWindow()
         self.window.SetOffScreenRendering(1)
         self.window.SetMultiSamples(0)  # without a graphics card, points take thrice the time with them
@@ -59,6 +62,8 @@ class Scene:
         """(m, 3) those points of the scan that are drawn at rest."""
         self._actors: dict[str, vtkActor] = {}
         self._camera: vtkCamera | None = None
+        self.faint = False
+        """Whether ridges let the points' colours through."""
         self.interactor.AddObserver("StartInteractionEvent", lambda *_: self.coarse(True))
         self.interactor.AddObserver("EndInteractionEvent", lambda *_: self.coarse(False))
         self.dark(False)
@@ -68,7 +73,7 @@ class Scene:
         self.renderer.SetBackground(*(_DARK if dark else _LIGHT))
 
     def show_points(self, points: Array) -> None:
-        """The scan (n, 3), by height; nothing else is shown any more, and the camera looks at all of it."""
+        """The scan (n, 3); nothing else is shown any more, and the camera looks at all of it."""
         self.renderer.RemoveAllViewProps()
         self._actors.clear()
         self.still = points[thinned(len(points), STILL)]
@@ -77,7 +82,6 @@ class Scene:
             look.LightingOff()
             look.SetPointSize(2.0 if len(self.still) > 50_000 else 3.0)
         self.coarse(False)
-        self.paint(by_height(self.still))
         self.from_above()
 
     def paint(self, colours: Pixels) -> None:
@@ -101,7 +105,7 @@ class Scene:
             self._show(surface, quads(grid))
         look = self._actors[surface].GetProperty()
         look.SetColor(*(_CHOSEN if chosen else _SURFACE))
-        look.SetOpacity(0.9)
+        look.SetOpacity(_FAINT if self.faint else 0.9)
         look.SetAmbient(0.35)
         look.SetDiffuse(0.65)
         self._line(f"crest {name}", crest(ridge), _CREST, 3.0)
@@ -115,8 +119,22 @@ class Scene:
         for name, own, colour in (("part", corners, _PART), ("part ridge", grown, _CHOSEN)):
             look = self._show(name, triangles(points, own)).GetProperty()
             look.SetColor(*colour)
-            look.SetSpecular(0.2)
+            look.SetAmbient(0.35)
+            look.SetDiffuse(0.65)
         self.only_part(True)
+
+    def look_at_part(self, points: Array, grown: NDArray[np.int64]) -> None:
+        """Look at a solid from where its ridge (triangles) is seen."""
+        a, b, c = (points[grown[:, k]] for k in range(3))
+        outwards = np.cross(b - a, c - a).sum(axis=0)
+        eye = outwards / max(float(np.linalg.norm(outwards)), 1e-300)
+        up = np.eye(3)[2 if abs(eye[2]) < 0.9 else 1]
+        eye = eye - 0.45 * np.eye(3)[1] if abs(eye[2]) >= 0.9 else eye + 0.3 * up
+        camera, middle = self.renderer.GetActiveCamera(), points.mean(axis=0)
+        camera.SetFocalPoint(*middle)
+        camera.SetPosition(*(middle + eye))
+        camera.SetViewUp(*up)
+        self.fit()
 
     def pick_part(self, across: float, down: float) -> Array | None:
         """The place (3,) on the solid under a place on the screen, as for `pick`."""
@@ -138,6 +156,7 @@ class Scene:
         """Put it back there."""
         if self._camera is not None:
             self.renderer.GetActiveCamera().DeepCopy(self._camera)
+            self.renderer.GetActiveCamera().Modified()  # which a copy does not tell
             self.renderer.ResetCameraClippingRange()
 
     def only_part(self, only: bool) -> None:

@@ -1,0 +1,291 @@
+"""What is done on the page and what it tells, without a browser."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from page_ridges import HEIGHT, LENGTH, PICK, registered, scan
+
+pytest.importorskip("vtkmodules")
+
+from ridgefeature.viewer import curves, preview, saved
+from ridgefeature.viewer.marching import March
+from ridgefeature.viewer.page import TOLD, Page
+from ridgefeature.viewer.scene import Scene
+from ridgefeature.viewer.session import Session
+from ridgefeature.viewer.work import Work
+
+
+class Told(SimpleNamespace):
+    """What the page would know; what cannot be sent there is refused."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        json.dumps(value)
+        super().__setattr__(name, value)
+
+    def __enter__(self) -> Told:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def page() -> Page:
+    scene, drawn = Scene(), []
+    page = Page(Told(**TOLD), scene, lambda: drawn.append(scene.window.Render()))
+    page.show_scan(scan(), "clay.ply")
+    return page
+
+
+@pytest.fixture
+def found(page: Page) -> Page:
+    page.do(Session().added(registered(), PICK))
+    return page
+
+
+@pytest.fixture
+def work(page: Page, tmp_path: Path) -> Iterator[Work]:
+    yield Work(page, tmp_path)
+
+
+def on(page: Page, place: tuple[float, float, float]) -> tuple[float, float]:
+    """Where a place of the scan is seen."""
+    page.scene.window.Render()
+    return page.scene.on_screen(np.array(place))
+
+
+def test_an_open_scan_is_told(page: Page) -> None:
+    assert page.tell.scan_name == "clay.ply"
+    assert page.tell.scan_note.startswith("12,000 points, 90 x 40 x ") and page.tell.scan_note.endswith(" cm")
+    assert page.tell.bar_text.endswith(" cm") and 40 < page.tell.bar <= 110
+    assert page.tell.ridges == [] and page.tell.profile == ""
+    assert page.scene.names() == ["moving", "still"]
+
+
+def test_a_click_on_the_ridge_registers_it_and_tells_it(work: Work) -> None:
+    page = work.page
+    asyncio.run(work.click(*on(page, PICK)))
+    assert page.tell.chosen == "ridge 1" and page.tell.busy == "" and not page.tell.bad
+    assert float(page.tell.height) == pytest.approx(HEIGHT, rel=0.03)
+    rows = {row["name"]: row["value"] for row in page.tell.rows}
+    assert {"coverage", "start stopped because", "end stopped because", "in doubt"} <= set(rows)
+    assert "<polyline" in page.tell.profile and 'class="dots" d="M' in page.tell.section
+    assert not [name for name in page.scene.names() if name.startswith("template")]
+
+
+def test_a_click_beside_the_ridge_says_so_at_the_place(work: Work) -> None:
+    page = work.page
+    asyncio.run(work.click(*on(page, (30.0, -16.0, 0.0))))
+    assert page.tell.bad and page.tell.hint.startswith("There is no ridge here: no ridge at (")
+    assert "direction=" not in page.tell.hint
+    assert "pick" in page.scene.names() and page.tell.ridges == []
+    asyncio.run(work.click(0.001, 0.001))
+    assert page.tell.bad and page.tell.hint.startswith("There is no scan point here")
+
+
+def test_a_march_is_seen_and_stopped(page: Page) -> None:
+    whole = March(scan(), PICK)
+    assert len(whole.run().templates) == len(whole.templates) > 6
+    stopped = March(scan(), PICK)
+    note = stopped._noted
+
+    def stop_at_three(template: Any) -> None:
+        note(template)
+        if len(stopped.templates) == 3:
+            stopped.stop()
+
+    stopped._noted = stop_at_three  # type: ignore[method-assign]
+    ridge = stopped.run()
+    assert 3 <= len(ridge.templates) <= 4 < len(whole.templates) and stopped.stopped
+    assert "interrupted" in ridge.stop
+    none = March(scan(), PICK)
+    none.stop()
+    assert len(none.run().templates) <= 1, "what is there is kept"
+
+
+def test_sliders_change_the_surface_and_are_one_step(found: Page) -> None:
+    for h in np.linspace(1.0, 1.5, 11):
+        found.slide("h", float(h))
+    assert found.tell.h == 1.5
+    assert float(found.tell.height) == pytest.approx(1.5 * float(np.abs(registered().height).max()), rel=1e-4)
+    found.absolute("height", 2 * float(found.tell.height))
+    assert found.tell.h == pytest.approx(3.0, rel=1e-3)
+    found.undo()
+    assert found.tell.h == 1.0 and found.tell.can_redo
+    found.redo()
+    found.slide("w", 0.5)
+    found.reset()
+    assert (found.tell.h, found.tell.w) == (1.0, 1.0)
+    with pytest.raises(ValueError, match="expected a rate from"):
+        found.slide("h", 99.0)
+    found.slide("x", 2.0)
+    assert found.feature is not None and found.feature.h == 1.0
+
+
+def test_a_stretch_is_chosen_on_the_curves(found: Page) -> None:
+    length = registered().length
+    ends = curves.part_of(0.6 * length, length), curves.part_of(0.2 * length, length)
+    found.stretch(*ends)
+    found.slide("h", 2.0)
+    assert found.tell.stretch.startswith("s = ") and 'class="stretch"' in found.tell.profile
+    ridge = found.feature.ridge if found.feature else registered()
+    assert ridge.height[0] == registered().height[0] and ridge.height.max() > 1.9 * HEIGHT
+    found.whole()
+    assert found.tell.stretch == ""
+    found.stretch(ends[0], ends[0])
+    assert found.tell.bad and "drag further" in found.tell.hint
+    found.stretch(0.0, 1.0)
+    assert found.feature is not None and found.feature.between == (0.0, length)
+
+
+def test_curves_and_view_point_at_the_same_place(found: Page) -> None:
+    length = registered().length
+    found.point(curves.part_of(0.25 * length, length))
+    assert f"s = {0.25 * length:.4g}" in found.tell.section and "place" in found.scene.names()
+    found.hover(*on(found, (45.0, 0.0, HEIGHT)))
+    told = curves.place_of(found.tell.place, length)
+    start = float(registered().spine[0, 0])
+    way = np.sign(registered().spine[-1, 0] - start)
+    assert told == pytest.approx(way * (45.0 - start), abs=1.0)
+    before = found.tell.place
+    found.step(1)
+    assert found.tell.place > before
+    found.step(-1000)
+    assert curves.place_of(found.tell.place, length) == pytest.approx(0.0, abs=1e-9)
+    found.point(0.001)
+    assert curves.place_of(found.tell.place, length) == pytest.approx(0.0, abs=1e-9), "beside the curves"
+
+
+def test_ridges_are_shown_hidden_renamed_and_removed(found: Page) -> None:
+    found.do(found.session.added(registered().resized(h=-1.0), PICK))
+    assert [r["name"] for r in found.tell.ridges] == ["ridge 1", "groove 1"]
+    found.toggle("ridge 1")
+    assert "surface ridge 1" not in found.scene.names() and "surface groove 1" in found.scene.names()
+    found.rename("groove 1", "seam")
+    assert "surface seam" in found.scene.names() and "surface groove 1" not in found.scene.names()
+    found.remove()
+    assert found.tell.chosen == "ridge 1"
+    found.remove("ridge 1")
+    assert found.tell.ridges == [] and found.tell.rows == [] and found.tell.profile == ""
+    for _ in range(4):
+        found.undo()
+    assert [r["name"] for r in found.tell.ridges] == ["ridge 1", "groove 1"]
+
+
+def test_points_are_coloured_by_deviation_of_the_registered_ridge(found: Page) -> None:
+    low = found.tell.legend
+    found.slide("h", 3.0)
+    found.colour("deviation")
+    assert found.tell.colouring == "deviation" and found.tell.legend != low
+    far = float(found.tell.legend[1].split()[0])
+    assert 0.1 < far < 0.2, "three deviations of 0.05, whatever the slider says"
+    found.remove()
+    found.colour("deviation")
+    assert found.tell.colouring == "height" and found.tell.legend == low
+
+
+def test_the_view_is_moved_by_keys(page: Page) -> None:
+    before = page.tell.bar_text, page.tell.bar
+    page.look("zoom", 4.0)
+    assert (page.tell.bar_text, page.tell.bar) != before
+    page.look("turn", 30.0, 0.0)
+    page.look("pan", 0.1, 0.1)
+    page.look("fit")
+    page.theme()
+    assert page.tell.dark
+
+
+def test_files_are_opened_by_name_in_the_working_folder_only(work: Work, tmp_path: Path) -> None:
+    page = work.page
+    np.save(tmp_path / "own.npy", scan().points[:5000])
+    asyncio.run(work.open_by_name("own.npy"))
+    assert page.tell.scan_name == "own.npy" and page.tell.scan_note.startswith("5,000 points")
+    for name in ("../other.npy", "/etc/passwd"):
+        asyncio.run(work.open_by_name(name))
+        assert page.tell.bad and "expected a file in" in page.tell.hint
+    (tmp_path / "bad.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\n")
+    asyncio.run(work.open_by_name("bad.ply"))
+    assert page.tell.bad and "bad.ply" in page.tell.hint
+    assert page.tell.scan_name == "own.npy" and page.tell.busy == "", "what was open stays open"
+
+
+def test_a_page_is_saved_and_opened_again(work: Work, found: Page, tmp_path: Path) -> None:
+    found.slide("h", 1.5)
+    path = asyncio.run(work.take("page", "", tmp_path))
+    assert path.name == "clay" + saved.SUFFIX
+    found.show_scan(scan(), "other")
+    asyncio.run(work.open(path, path.name))
+    assert found.tell.chosen == "ridge 1" and found.tell.h == 1.5
+    assert any(row["name"] == "coverage" for row in found.tell.rows)
+
+
+@pytest.mark.parametrize("kind", preview.HOSTS)
+def test_the_ridge_is_seen_on_a_part(work: Work, found: Page, kind: str, tmp_path: Path) -> None:
+    found.slide("h", 1.2)
+    found.tell.host = kind
+    asyncio.run(work.preview.paste())
+    part = work.preview.part
+    assert part is not None and found.tell.pasting and found.tell.busy == ""
+    assert "checked for self-intersections" in found.tell.part_note
+    assert part.solid.isValid() and part.solid.Volume() > 0
+    assert not found.scene._actors["still"].GetVisibility()
+    path = asyncio.run(work.take("part", "", tmp_path))
+    import cad_export as cx
+
+    assert cx.load(path).height.max() > 0
+    work.preview.leave()
+    assert found.scene._actors["still"].GetVisibility() and "part" not in found.scene.names()
+
+
+def test_a_part_follows_the_sliders_and_the_click(work: Work, found: Page) -> None:
+    async def story() -> list[float]:
+        await work.preview.paste()
+        volumes = []
+        for change in (lambda: found.slide("h", 1.5), lambda: None):
+            change()
+            work.preview.again()
+            assert work.preview._task is not None
+            await work.preview._task
+            assert work.preview.part is not None
+            volumes.append(work.preview.part.solid.Volume())
+        host = work.preview._host[2].Volume()
+        middle = work.preview.part.points[np.unique(work.preview.part.grown)].mean(axis=0)
+        await work.preview.put(*on(found, (middle[0] + 3.0, middle[1] + 3.0, middle[2])))
+        assert work.preview._task is not None
+        await work.preview._task
+        assert work.preview.part is not None, found.tell.hint
+        moved = work.preview.part.points[np.unique(work.preview.part.grown)].mean(axis=0)
+        assert np.linalg.norm((moved - middle)[:2]) > 1.0
+        return [v - host for v in volumes]
+
+    taller, same = asyncio.run(story())
+    assert taller == same and taller > 0
+
+
+def test_what_cannot_be_pasted_is_told(work: Work, found: Page, tmp_path: Path) -> None:
+    import cadquery as cq
+
+    path = tmp_path / "small.step"
+    cq.exporters.export(cq.Workplane().box(10, 10, 10), str(path))
+    asyncio.run(work.preview.open_host(path, path.name))
+    assert found.tell.bad and found.tell.hint.startswith("It cannot be pasted: ")
+    assert found.tell.host == "file" and found.tell.host_name == "small.step"
+    with pytest.raises(ValueError, match="expected a part with a ridge"):
+        asyncio.run(work.take("part", "", tmp_path))
+    cq.exporters.export(cq.Workplane().rarray(30, 1, 2, 1).box(10, 10, 10), str(path))
+    with pytest.raises(ValueError, match="expected one solid"):
+        asyncio.run(work.preview.open_host(path, path.name))
+    with pytest.raises(ValueError, match="host: expected one of"):
+        preview.host_for("cone", registered())
+
+
+def test_the_length_of_the_ridge_is_that_of_the_scan() -> None:
+    assert registered().length == pytest.approx(LENGTH, rel=0.02)
