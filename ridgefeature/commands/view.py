@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import click
 
 from ridgefeature.commands import interrupts
+from ridgefeature.scan import millimetres_per
 
 _MEGABYTE = 2**20
 
 
 def run(scan: Path | None, unit: str | None, host: str, port: int, upload: int, browser: bool) -> None:
-    """Serve it until it is interrupted."""
+    """Serve it until it is interrupted. What is wrong with the words is told before there is a page."""
+    if scan is not None and not scan.is_file():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(scan))
+    if unit is not None:
+        millimetres_per(unit)
+    from ridgefeature.viewer.guard import LOOPBACK
     from ridgefeature.viewer.serve import serve
 
     def ready(address: str) -> None:
+        if host not in LOOPBACK:
+            click.echo("Whoever reaches this address and has its token may use the page.", err=True)
         click.echo(f"The page is at {address}\nCtrl-C ends it.")
 
     with interrupts.at_once():

@@ -19,8 +19,8 @@ from ridgefeature.viewer.marching import March
 from ridgefeature.viewer.page import HINT, Page
 from ridgefeature.viewer.part_preview import PartPreview, aside
 
-_EVERY = 0.03
-"""Seconds between two looks at what was found."""
+_EVERY, _FIRST = 0.03, 0.01
+"""Seconds between two looks at what was found, and before anything is."""
 
 
 class Work:
@@ -97,7 +97,7 @@ class Work:
         page, shown = self.page, 0
         task = asyncio.ensure_future(aside(march.run))
         while not task.done():
-            await asyncio.wait({task}, timeout=_EVERY)
+            await asyncio.wait({task}, timeout=_EVERY if shown else _FIRST)
             if len(march.templates) > shown:
                 for number, template in enumerate(march.templates[shown:], shown):
                     page.scene.show_template(template, number)

@@ -7,15 +7,23 @@
   };
   const on = (event, selector) => event.target instanceof Element && event.target.closest(selector);
 
-  // The view: a press and release at one place is a click, all else turns the camera.
-  let pressed = null;
+  // The view: a press and release at one place is a click, all else turns the camera. A press is kept from
+  // the camera until the pointer moves: a click then waits for no picture.
+  let held = null;
   document.addEventListener("pointerdown", (e) => {
-    pressed = on(e, "#view") && e.button === 0 ? [e.clientX, e.clientY] : null;
+    held = null;
+    if (e.isTrusted && on(e, "#view") && e.button === 0 && !e.shiftKey) { held = e; e.stopPropagation(); }
+  }, true);
+  document.addEventListener("pointermove", (e) => {
+    if (!held || Math.hypot(e.clientX - held.clientX, e.clientY - held.clientY) < 4) return;
+    const press = held;
+    held = null;
+    press.target.dispatchEvent(new PointerEvent("pointerdown", press));
   }, true);
   document.addEventListener("pointerup", (e) => {
-    const view = on(e, "#view");
-    if (view && pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) tell("click", ...part(e, view));
-    pressed = null;
+    const view = held && on(e, "#view");
+    if (view) { tell("click", ...part(e, view)); e.stopPropagation(); }
+    held = null;
   }, true);
   let hovered = 0;
   document.addEventListener("pointermove", (e) => {
