@@ -127,6 +127,7 @@ class Page:
         if not self.tell.pasting:
             self.scene.coarse(False)
         self.draw()
+        self.scale()
 
     def reset(self) -> None:
         """The chosen ridge as it was registered."""

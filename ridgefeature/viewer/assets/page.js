@@ -23,8 +23,12 @@
   document.addEventListener("pointerup", (e) => {
     const view = held && on(e, "#view");
     if (view) { tell("click", ...part(e, view)); e.stopPropagation(); }
+    if (!view && on(e, "#view")) rest();
     held = null;
   }, true);
+  let resting = 0;
+  const rest = () => { clearTimeout(resting); resting = setTimeout(() => tell("rest"), 120); };
+  document.addEventListener("wheel", (e) => { if (on(e, "#view")) rest(); }, { capture: true, passive: true });
   let hovered = 0;
   document.addEventListener("pointermove", (e) => {
     const view = on(e, "#view");
