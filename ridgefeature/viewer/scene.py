@@ -40,6 +40,8 @@ _SURFACE, _CHOSEN, _CREST, _TEMPLATE = (
 )
 _PART = (0.72, 0.76, 0.8)
 _FAINT = 0.15
+_FRONT = -700.0
+"""By how much ridges are drawn in front of where they are, in 2^-16 of the depth: points lie in them."""
 _ACROSS, _A_STATION = 31, 2
 _LIGHT, _DARK = (1.0, 1.0, 1.0), (0.09, 0.1, 0.12)
 
@@ -109,6 +111,15 @@ class Scene:
         look.SetAmbient(0.35)
         look.SetDiffuse(0.65)
         self._line(f"crest {name}", crest(ridge), _CREST, 3.0)
+        self._forward(surface, _FRONT)
+        self._forward(f"crest {name}", 2.0 * _FRONT)
+
+    def _forward(self, name: str, shift: float) -> None:
+        mapper = self._actors[name].GetMapper()
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, shift)
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, shift)
+        mapper.SetRelativeCoincidentTopologyPointOffsetParameter(shift)
 
     def hide_ridge(self, name: str) -> None:
         for own in (f"surface {name}", f"crest {name}"):
@@ -167,7 +178,8 @@ class Scene:
             self.coarse(False)
 
     def show_template(self, template: Template, number: int) -> None:
-        self._line(f"template {number}", outline(template), _TEMPLATE, 1.5)
+        self._line(f"template {number}", outline(template), _TEMPLATE, 2.0)
+        self._forward(f"template {number}", 2.0 * _FRONT)
 
     def mark(self, place: Array | None, name: str = "mark", size: float = 10.0) -> None:
         """A dot at a place (3,); None: no dot."""
@@ -179,6 +191,7 @@ class Scene:
         look.SetColor(*_CREST)
         look.LightingOff()
         look.RenderPointsAsSpheresOn()
+        self._forward(name, 3.0 * _FRONT)
 
     def hide(self, prefix: str) -> None:
         """All whose names begin so."""
