@@ -22,6 +22,12 @@ def number(value: float, digits: int = 4) -> str:
     return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
 
 
+def round_below(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(m for m in (1, 2, 5) if m * power <= value * (1 + 1e-12)) * power)
+
+
 def rows(ridge: Ridge, found: Diagnosis) -> list[tuple[str, str]]:
     """The diagnosis for people: names and values."""
     unit = ridge.unit

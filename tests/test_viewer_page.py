@@ -192,6 +192,22 @@ def test_points_are_coloured_by_deviation_of_the_registered_ridge(found: Page) -
     assert found.tell.colouring == "height" and found.tell.legend == low
 
 
+def test_points_have_the_colours_of_their_file(work: Work, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    colours = np.random.default_rng(1).integers(0, 256, (12_000, 3)).astype(np.uint8)
+    trimesh.PointCloud(scan().points, colours).export(tmp_path / "a.ply")
+    page = work.page
+    asyncio.run(work.open_by_name("a.ply"))
+    assert page.tell.coloured and page.tell.colouring == "file" and page.tell.legend == []
+    shown = page.scene._actors["still"].GetMapper().GetInput().GetPointData().GetScalars()
+    assert shown.GetTuple(5) == tuple(colours[5])
+    page.colour("height")
+    assert page.tell.colouring == "height" and len(page.tell.legend) == 2
+    page.show_scan(scan(), "clay.ply")
+    page.colour("file")
+    assert not page.tell.coloured and page.tell.colouring == "height"
+
+
 def test_the_view_is_moved_by_keys(page: Page) -> None:
     before = page.tell.bar_text, page.tell.bar
     page.look("zoom", 4.0)

@@ -14,7 +14,7 @@ from ridgefeature.plot import camera as cameras
 from ridgefeature.plot.camera import Camera
 from ridgefeature.plot.files import new_figure, save
 from ridgefeature.plot.scene import SPINE, SURFACE, TEMPLATE, Pixels, Scene, build, render, surface_colours
-from ridgefeature.readable import number
+from ridgefeature.readable import number, round_below
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
 
@@ -177,7 +177,7 @@ def _keep_inside(axes: Any, words: Any) -> None:
 
 
 def _scale_bar(axes: Any, eye: Camera, unit: str) -> None:
-    length = _round(0.3 * eye.half_width)
+    length = round_below(0.3 * eye.half_width)
     right, low = 0.97 * eye.half_width, -0.93 * eye.half_height
     box = {"boxstyle": "round,pad=0.25", "fc": "white", "ec": "none", "alpha": 0.85}
     axes.text(
@@ -192,12 +192,6 @@ def _scale_bar(axes: Any, eye: Camera, unit: str) -> None:
     )
     axes.plot([right - length, right], [low, low], color="white", lw=8, solid_capstyle="butt", zorder=5)
     axes.plot([right - length, right], [low, low], color="black", lw=4, solid_capstyle="butt", zorder=7)
-
-
-def _round(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above the value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(m for m in (1, 2, 5) if m * power <= value * (1 + 1e-12)) * power)
 
 
 def _triad(axes: Any, eye: Camera, aspect: float) -> None:

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.diagnosis import Diagnosis
-from ridgefeature.readable import ends, kind, number, templates
+from ridgefeature.readable import ends, kind, number, round_below, templates
 from ridgefeature.readable import rows as trust
 from ridgefeature.scan import Scan
 from ridgefeature.viewer import curves
-from ridgefeature.viewer.colours import by_deviation, by_height
+from ridgefeature.viewer.colours import Pixels, by_deviation, by_height
 from ridgefeature.viewer.pointing import Pointing
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.session import LEAST, MOST, Feature, History, Session
@@ -31,7 +31,7 @@ TOLD: dict[str, Any] = {
     "stretch": "", "can_undo": False, "can_redo": False, "colouring": "height", "dark": False,
     "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "height": "",
     "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane", "part_note": "",
-    "host_name": "",
+    "host_name": "", "coloured": False,
 }  # fmt: skip
 """What the page knows, and how it begins."""
 
@@ -47,6 +47,7 @@ class Page:
         """By id of a registered ridge, what its scan tells of it."""
         self.pointing = Pointing(tell, scene)
         self._shown: set[str] = set()
+        self._own_colours: Pixels | None = None
 
     @property
     def session(self) -> Session:
@@ -70,7 +71,7 @@ class Page:
         size = " x ".join(number(x, 3) for x in np.ptp(scan.bounds, axis=0))
         self.tell.scan_name, self.tell.unit = name, scan.unit
         self.tell.scan_note = f"{len(scan):,} points{few}, {size} {scan.unit}"
-        self.tell.pasting = False
+        self.tell.pasting, self._own_colours, self.tell.coloured = False, None, False
         self.say(HINT)
         self.colour("height")
 
@@ -156,6 +157,12 @@ class Page:
 
     # What is seen.
 
+    def own_colours(self, colours: Pixels | None) -> None:
+        """Colours (m, 3) that the file has for the points that are drawn; None: it has none."""
+        self._own_colours, self.tell.coloured = colours, colours is not None
+        if colours is not None:
+            self.colour("file")
+
     def hover(self, across: float, down: float) -> None:
         """As `Pointing.hover`."""
         self.pointing.hover(self.feature, across, down)
@@ -174,9 +181,14 @@ class Page:
             self.draw()
 
     def colour(self, by: str) -> None:
-        """Points by "height" or by "deviation" from the chosen ridge, as it was registered."""
+        """Points by "height", by "deviation" from the chosen ridge as registered, or as in the "file"."""
         feature, points = self.feature, self.scene.still
         if not len(points):
+            return
+        if by == "file" and self._own_colours is not None:
+            self.scene.paint(self._own_colours)
+            self.scene.faint, self.tell.colouring, self.tell.legend = False, "file", []
+            self.refresh()
             return
         deviation = by == "deviation" and feature is not None
         if deviation and feature is not None:
@@ -212,7 +224,7 @@ class Page:
     def scale(self) -> None:
         """Tell how long the scale bar is, in pixels, and what that is."""
         pixel = self.scene.length_of_pixel()
-        length = _round(110.0 * pixel)
+        length = round_below(110.0 * pixel)
         self.tell.bar, self.tell.bar_text = length / pixel, f"{number(length)} {self.tell.unit}"
 
     def say(self, text: str, bad: bool = False) -> None:
@@ -283,9 +295,3 @@ class Page:
 def _largest(values: Array) -> float:
     """The value that is farthest from 0."""
     return float(values[np.argmax(np.abs(values))])
-
-
-def _round(length: float) -> float:
-    """1, 2 or 5 times a power of ten, no longer than this."""
-    power = 10.0 ** np.floor(np.log10(max(length, 1e-300)))
-    return float(max(k * power for k in (1, 2, 5) if k * power <= length * (1 + 1e-9)))

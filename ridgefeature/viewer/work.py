@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ridgefeature.diagnosis import diagnose
+from ridgefeature.io.colours import Pixels, colours_at
 from ridgefeature.io.read import read_scan
 from ridgefeature.registration import NoRidgeError, register
 from ridgefeature.ridge import Ridge
@@ -57,6 +59,7 @@ class Work:
                     return
                 scan = await aside(lambda: read_scan(path, unit=unit))
                 self.page.show_scan(scan, name)
+                self.page.own_colours(await aside(lambda: _colours(path, self.page.scene.still)))
 
     async def open_by_name(self, name: str) -> None:
         """Open a file of the working folder, by its path in it."""
@@ -170,6 +173,14 @@ class Work:
         finally:
             with tell:
                 tell.busy = ""
+
+
+def _colours(path: Path, places: NDArray[np.float64]) -> Pixels | None:
+    """The file's own, where it has any that can be read."""
+    try:
+        return colours_at(path, places)
+    except (ValueError, OSError, ImportError, KeyError, IndexError):
+        return None
 
 
 def _rehearse() -> None:
