@@ -60,6 +60,7 @@ def opened(address: str) -> Iterator[Any]:
         browser = p.chromium.launch(executable_path=CHROMIUM, args=_FLAGS)
         page = browser.new_page(viewport={"width": 1280, "height": 720}, accept_downloads=True)
         page.set_default_timeout(_WAIT)
+        page.on("dialog", lambda dialog: dialog.accept())
         elsewhere: list[str] = []
         own = address.split("/?")[0]
         page.on("request", lambda r: r.url.startswith((own, "blob:", "data:")) or elsewhere.append(r.url))

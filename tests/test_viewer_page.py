@@ -17,7 +17,7 @@ pytest.importorskip("vtkmodules")
 
 from ridgefeature.viewer import curves, preview, saved
 from ridgefeature.viewer.marching import March
-from ridgefeature.viewer.page import TOLD, Page
+from ridgefeature.viewer.page import FIELDS, TOLD, Page
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.session import Session
 from ridgefeature.viewer.work import Work
@@ -128,6 +128,24 @@ def test_sliders_change_the_surface_and_are_one_step(found: Page) -> None:
         found.slide("h", 99.0)
     found.slide("x", 2.0)
     assert found.feature is not None and found.feature.h == 1.0
+
+
+def test_fields_of_the_page_change_the_ridge_and_nonsense_is_told(found: Page) -> None:
+    def fields(**changed: Any) -> dict[str, Any]:
+        return {name: getattr(found.tell, name) for name in FIELDS} | changed
+
+    assert not found.edited(fields()), "as it was told"
+    assert found.edited(fields(h=1.25))
+    assert found.tell.h == 1.25 and float(found.tell.height) == pytest.approx(1.25 * HEIGHT, rel=0.03)
+    assert found.edited(fields(height="6"))
+    assert float(found.tell.height) == pytest.approx(6.0, rel=1e-4)
+    for nonsense in ("", "abc", None, "nan", "1e9", "-1", 0):
+        for name in FIELDS:
+            found.say("")
+            before = fields()
+            assert found.edited(fields(**{name: nonsense}))
+            assert found.tell.bad and "expected a rate from 0.2 to 3" in found.tell.hint, (name, nonsense)
+            assert fields() == before
 
 
 def test_a_stretch_is_chosen_on_the_curves(found: Page) -> None:

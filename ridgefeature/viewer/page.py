@@ -34,6 +34,8 @@ TOLD: dict[str, Any] = {
     "host_name": "", "coloured": False,
 }  # fmt: skip
 """What the page knows, and how it begins."""
+FIELDS = ("h", "w", "height", "width")
+"""What of it is changed there."""
 
 
 class Page:
@@ -47,6 +49,7 @@ class Page:
         """By id of a registered ridge, what its scan tells of it."""
         self.pointing = Pointing(tell, scene)
         self._shown: set[str] = set()
+        self._fields: dict[str, Any] = {}
         self._own_colours: Pixels | None = None
 
     @property
@@ -122,6 +125,26 @@ class Page:
         if feature is not None and what in ("height", "width"):
             usual = _largest(getattr(feature.registered, what))
             self.slide(what[0], float(value) / usual)
+
+    def edited(self, told: dict[str, Any]) -> bool:
+        """Fields of the page, FIELDS, as they are there now; whether one was changed there: the first counts."""
+        changed = next((name for name in FIELDS if told[name] != self._fields.get(name)), None)
+        if changed is None or self.feature is None:
+            return False
+        value = told[changed]
+        try:
+            wanted = float(value)
+        except (TypeError, ValueError):
+            wanted = float("nan")
+        try:
+            if changed in ("h", "w"):
+                self.slide(changed, wanted)
+            else:
+                self.absolute(changed, wanted)
+        except ValueError as error:
+            self.say(str(error), bad=True)
+            self.refresh()
+        return True
 
     def rest(self) -> None:
         """Nothing moves any more: all points are drawn."""
@@ -256,8 +279,9 @@ class Page:
             self.scene.mark(None, "place")
             return
         ridge = feature.ridge
-        tell.h, tell.w = feature.h, feature.w
-        tell.height, tell.width = (f"{_largest(x):.5g}" for x in (ridge.height, ridge.width))
+        height, width = (f"{_largest(x):.5g}" for x in (ridge.height, ridge.width))
+        self._fields = dict(zip(FIELDS, (feature.h, feature.w, height, width), strict=True))
+        tell.h, tell.w, tell.height, tell.width = self._fields.values()
         low, high = feature.between or (0.0, ridge.length)
         tell.stretch = "" if feature.between is None else f"s = {number(low)} to {number(high)} {ridge.unit}"
         tell.profile = curves.profile(ridge, feature.between)
@@ -281,9 +305,8 @@ class Page:
     def triggers(self) -> dict[str, Callable[..., None]]:
         """All that is done at once, by the name that the page calls it."""
         own = (
-            self.undo, self.redo, self.choose, self.toggle, self.remove, self.rename, self.slide,
-            self.absolute, self.rest, self.reset, self.stretch, self.whole, self.hover, self.point, self.step,
-            self.colour, self.theme,
+            self.undo, self.redo, self.choose, self.toggle, self.remove, self.rename, self.rest, self.reset,
+            self.stretch, self.whole, self.hover, self.point, self.step, self.colour, self.theme,
         )  # fmt: skip
         moves = {how: partial(self.look, how) for how in ("fit", "turn", "zoom", "pan")}
         return {**{f.__name__: f for f in own}, **moves, "help": self._help}

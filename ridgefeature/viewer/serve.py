@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ridgefeature.viewer.guard import LOOPBACK, add_headers, guard
-from ridgefeature.viewer.page import TOLD, Page
+from ridgefeature.viewer.page import FIELDS, TOLD, Page
 from ridgefeature.viewer.routes import routes
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.work import Work
@@ -46,6 +46,12 @@ def serve(
     work = Work(page, Path.cwd())
     for name, what in _triggers(page, work).items():
         server.controller.trigger(name)(what)
+
+    @server.state.change(*FIELDS)
+    def edited(**told: Any) -> None:
+        if page.edited({field: told[field] for field in FIELDS}):
+            work.preview.again()
+
     with tempfile.TemporaryDirectory(prefix="ridgefeature-") as folder:
         names = LOOPBACK if host in ("127.0.0.1", "localhost", "::1") else (*LOOPBACK, host)
 
@@ -89,7 +95,7 @@ def _markup(server: Any, scene: Scene) -> Any:
     from trame.widgets import html
     from trame.widgets import vtk as vtk_widgets
 
-    server.state.update({**TOLD, "naming": "", "trame__title": "ridgefeature"})
+    server.state.update({**TOLD, "naming": "", "new_name": "", "trame__title": "ridgefeature"})
     server.enable_module(
         {"serve": {"own": str(_HERE / "assets")}, "scripts": ["own/page.js"], "styles": ["own/page.css"]}
     )
@@ -122,7 +128,7 @@ def _triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
 
         return done
 
-    changing = (page.slide, page.absolute, page.reset, page.stretch, page.whole, page.undo, page.redo)
+    changing = (page.reset, page.stretch, page.whole, page.undo, page.redo, page.choose)
     return {
         **{name: then_pasted(what) for name, what in page.triggers().items()},
         "click": begin(work.click),

@@ -33,12 +33,15 @@ class Work:
         self.march: March | None = None
         self.preview = PartPreview(page)
         self._lock = asyncio.Lock()
+        self._doing: list[str] = []
+        self._ready = True
 
     async def warm(self) -> None:
         """Have all compiled that a march needs, which takes a minute or two the first time of all."""
+        self._ready = False
         with self._telling("Getting ready: the first time of all this takes a minute or two"):
-            async with self._lock:
-                await aside(_rehearse)
+            await aside(_rehearse)
+        self._ready = True
 
     @property
     def busy(self) -> bool:
@@ -83,7 +86,10 @@ class Work:
         if page.tell.pasting:
             await self.preview.put(across, down)
             return
-        if page.scan is None or self.busy:
+        if page.scan is None:
+            return
+        if self.busy or not self._ready:
+            page.say(f"Not yet: {page.tell.busy or 'busy'}. Click again then.", bad=True)
             return
         place = page.scene.pick(across, down)
         if place is None:
@@ -129,8 +135,6 @@ class Work:
         page.do(page.session.added(ridge, march.at))
         stopped = " It was stopped: what was found is kept." if march.stopped else ""
         page.say(f"{page.session.chosen}: {len(ridge.templates)} templates.{stopped} {HINT}")
-        with page.tell:
-            page.tell.busy = ""
         await self._diagnose(ridge)
         page.refresh()
 
@@ -164,15 +168,17 @@ class Work:
 
     @contextmanager
     def _telling(self, text: str) -> Iterator[None]:
-        """Tell what is being done while it is."""
+        """Tell what is being done while it is; of several things the last that was begun."""
         tell = self.page.tell
+        self._doing.append(text)
         with tell:
             tell.busy, tell.count, tell.bad = text, 0, False
         try:
             yield
         finally:
+            self._doing.remove(text)
             with tell:
-                tell.busy = ""
+                tell.busy = self._doing[-1] if self._doing else ""
 
 
 def _colours(path: Path, places: NDArray[np.float64]) -> Pixels | None:

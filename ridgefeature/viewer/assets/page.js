@@ -79,6 +79,9 @@
   // Files: dropped on the page, or chosen.
   const send = async (file) => {
     if (!file) return;
+    const kept = document.querySelectorAll(".ridge").length;
+    const another = window.ridgeOpens !== "host";
+    if (kept && another && !confirm(`Open ${file.name}? The ridges of this scan are lost unless you save the page first.`)) return;
     tell("sending", file.name, file.size);
     let answer = null;
     try {
