@@ -89,7 +89,7 @@ def slides(report: Report) -> None:
     taken = []
     for h in np.linspace(1.0, 2.0, 50):
         start = time.perf_counter()
-        page.slide("h", float(h))
+        page.sizes.slide("h", float(h))
         taken.append(time.perf_counter() - start)
     note = f"(worst of 50: {1000 * max(taken):.0f} ms)"
     report.add("one step of a slider, server time [s]", at_most(0.06), statistics.median(taken), note)

@@ -17,9 +17,10 @@ pytest.importorskip("vtkmodules")
 
 from ridgefeature.viewer import curves, preview, saved
 from ridgefeature.viewer.marching import March
-from ridgefeature.viewer.page import FIELDS, TOLD, Page
+from ridgefeature.viewer.page import TOLD, Page
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.session import Session
+from ridgefeature.viewer.sizes import FIELDS
 from ridgefeature.viewer.work import Work
 
 
@@ -113,20 +114,20 @@ def test_a_march_is_seen_and_stopped(page: Page) -> None:
 
 def test_sliders_change_the_surface_and_are_one_step(found: Page) -> None:
     for h in np.linspace(1.0, 1.5, 11):
-        found.slide("h", float(h))
+        found.sizes.slide("h", float(h))
     assert found.tell.h == 1.5
     assert float(found.tell.height) == pytest.approx(1.5 * float(np.abs(registered().height).max()), rel=1e-4)
-    found.absolute("height", 2 * float(found.tell.height))
+    found.sizes.absolute("height", 2 * float(found.tell.height))
     assert found.tell.h == pytest.approx(3.0, rel=1e-3)
     found.undo()
     assert found.tell.h == 1.0 and found.tell.can_redo
     found.redo()
-    found.slide("w", 0.5)
-    found.reset()
+    found.sizes.slide("w", 0.5)
+    found.sizes.reset()
     assert (found.tell.h, found.tell.w) == (1.0, 1.0)
     with pytest.raises(ValueError, match="expected a rate from"):
-        found.slide("h", 99.0)
-    found.slide("x", 2.0)
+        found.sizes.slide("h", 99.0)
+    found.sizes.slide("x", 2.0)
     assert found.feature is not None and found.feature.h == 1.0
 
 
@@ -134,33 +135,79 @@ def test_fields_of_the_page_change_the_ridge_and_nonsense_is_told(found: Page) -
     def fields(**changed: Any) -> dict[str, Any]:
         return {name: getattr(found.tell, name) for name in FIELDS} | changed
 
-    assert not found.edited(fields()), "as it was told"
-    assert found.edited(fields(h=1.25))
+    assert not found.sizes.edited(fields()), "as it was told"
+    assert found.sizes.edited(fields(h=1.25))
     assert found.tell.h == 1.25 and float(found.tell.height) == pytest.approx(1.25 * HEIGHT, rel=0.03)
-    assert found.edited(fields(height="6"))
+    assert found.sizes.edited(fields(height="6"))
     assert float(found.tell.height) == pytest.approx(6.0, rel=1e-4)
     for nonsense in ("", "abc", None, "nan", "1e9", "-1", 0):
         for name in FIELDS:
             found.say("")
             before = fields()
-            assert found.edited(fields(**{name: nonsense}))
-            assert found.tell.bad and "expected a rate from 0.2 to 3" in found.tell.hint, (name, nonsense)
+            assert found.sizes.edited(fields(**{name: nonsense}))
+            assert found.tell.bad and found.tell.hint.startswith(f"{name}: expected "), (name, nonsense)
             assert fields() == before
+
+
+def test_what_there_is_no_room_for_changes_nothing(found: Page) -> None:
+    before = found.session, found.tell.width
+    with pytest.raises(ValueError, match="expected at most"):
+        found.sizes.slide("w", 3.0)
+    assert (found.session, found.tell.width) == before and found.tell.w == 1.0
+    found.sizes.slide("h", 2.0)
+    assert found.tell.h == 2.0
+
+
+def test_stretches_add_up(found: Page) -> None:
+    length = registered().length
+    found.sizes.stretch(curves.part_of(0.1 * length, length), curves.part_of(0.4 * length, length))
+    found.sizes.slide("h", 2.0)
+    found.sizes.absolute("height", 1.5 * HEIGHT)
+    assert float(found.tell.height) == pytest.approx(1.5 * HEIGHT, rel=0.01), "that of the stretch"
+    found.sizes.stretch(curves.part_of(0.6 * length, length), curves.part_of(0.9 * length, length))
+    assert found.tell.h == 1.0 and float(found.tell.height) == pytest.approx(HEIGHT, rel=0.05)
+    found.sizes.slide("h", 0.5)
+    assert found.feature is not None
+    ridge, quarter = found.feature.ridge, len(registered().height) // 4
+    assert ridge.height[quarter] == pytest.approx(1.5 * HEIGHT, rel=0.05)
+    assert ridge.height[3 * quarter] == pytest.approx(0.5 * HEIGHT, rel=0.05)
+    found.sizes.whole()
+    assert found.tell.h == 1.0 and np.array_equal(found.feature.ridge.height, ridge.height)
+    found.sizes.reset()
+    assert np.array_equal(found.feature.ridge.height, registered().height)
+
+
+def test_a_click_on_a_ridge_that_is_known_chooses_it(work: Work, found: Page) -> None:
+    found.do(found.session.added(registered().resized(h=-1.0), PICK))
+    found.toggle("groove 1")
+    asyncio.run(work.click(*on(found, PICK)))
+    assert found.tell.chosen == "ridge 1" and len(found.tell.ridges) == 2
+
+
+def test_the_unit_is_chosen_before_there_are_ridges(page: Page) -> None:
+    page.set_unit("m")
+    assert page.scan is not None and page.scan.unit == "m"
+    assert page.tell.scan_note.endswith(" m") and page.tell.bar_text.endswith(" m")
+    with pytest.raises(ValueError, match="expected a length unit"):
+        page.set_unit("parsec")
+    page.do(Session().added(registered(), PICK))
+    page.set_unit("mm")
+    assert page.tell.bad and page.tell.unit == page.scan.unit == "m"
 
 
 def test_a_stretch_is_chosen_on_the_curves(found: Page) -> None:
     length = registered().length
     ends = curves.part_of(0.6 * length, length), curves.part_of(0.2 * length, length)
-    found.stretch(*ends)
-    found.slide("h", 2.0)
+    found.sizes.stretch(*ends)
+    found.sizes.slide("h", 2.0)
     assert found.tell.stretch.startswith("s = ") and 'class="stretch"' in found.tell.profile
     ridge = found.feature.ridge if found.feature else registered()
     assert ridge.height[0] == registered().height[0] and ridge.height.max() > 1.9 * HEIGHT
-    found.whole()
+    found.sizes.whole()
     assert found.tell.stretch == ""
-    found.stretch(ends[0], ends[0])
+    found.sizes.stretch(ends[0], ends[0])
     assert found.tell.bad and "drag further" in found.tell.hint
-    found.stretch(0.0, 1.0)
+    found.sizes.stretch(0.0, 1.0)
     assert found.feature is not None and found.feature.between == (0.0, length)
 
 
@@ -200,13 +247,17 @@ def test_ridges_are_shown_hidden_renamed_and_removed(found: Page) -> None:
 
 def test_points_are_coloured_by_deviation_of_the_registered_ridge(found: Page) -> None:
     low = found.tell.legend
-    found.slide("h", 3.0)
+    found.sizes.slide("h", 3.0)
     found.colour("deviation")
     assert found.tell.colouring == "deviation" and found.tell.legend != low
     far = float(found.tell.legend[1].split()[0])
     assert 0.1 < far < 0.2, "three deviations of 0.05, whatever the slider says"
+    legend = found.tell.legend
+    found.do(found.session.added(registered().resized(h=1.2), PICK))
+    assert found.tell.colouring == "deviation" and found.tell.legend != legend, "of the one that is chosen"
     found.remove()
-    found.colour("deviation")
+    assert found.tell.legend == legend
+    found.remove()
     assert found.tell.colouring == "height" and found.tell.legend == low
 
 
@@ -252,7 +303,7 @@ def test_files_are_opened_by_name_in_the_working_folder_only(work: Work, tmp_pat
 
 
 def test_a_page_is_saved_and_opened_again(work: Work, found: Page, tmp_path: Path) -> None:
-    found.slide("h", 1.5)
+    found.sizes.slide("h", 1.5)
     path = asyncio.run(work.take("page", "", tmp_path))
     assert path.name == "clay" + saved.SUFFIX
     found.show_scan(scan(), "other")
@@ -263,7 +314,7 @@ def test_a_page_is_saved_and_opened_again(work: Work, found: Page, tmp_path: Pat
 
 @pytest.mark.parametrize("kind", preview.HOSTS)
 def test_the_ridge_is_seen_on_a_part(work: Work, found: Page, kind: str, tmp_path: Path) -> None:
-    found.slide("h", 1.2)
+    found.sizes.slide("h", 1.2)
     found.tell.host = kind
     asyncio.run(work.preview.paste())
     part = work.preview.part
@@ -283,7 +334,7 @@ def test_a_part_follows_the_sliders_and_the_click(work: Work, found: Page) -> No
     async def story() -> list[float]:
         await work.preview.paste()
         volumes = []
-        for change in (lambda: found.slide("h", 1.5), lambda: None):
+        for change in (lambda: found.sizes.slide("h", 1.5), lambda: None):
             change()
             work.preview.again()
             assert work.preview._task is not None
@@ -309,9 +360,20 @@ def test_what_cannot_be_pasted_is_told(work: Work, found: Page, tmp_path: Path) 
 
     path = tmp_path / "small.step"
     cq.exporters.export(cq.Workplane().box(10, 10, 10), str(path))
-    asyncio.run(work.preview.open_host(path, path.name))
-    assert found.tell.bad and found.tell.hint.startswith("It cannot be pasted: ")
-    assert found.tell.host == "file" and found.tell.host_name == "small.step"
+
+    async def story() -> None:
+        await work.preview.open_host(path, path.name)
+        assert found.tell.host == "file" and found.tell.host_name == "small.step"
+        assert found.tell.hint.startswith("Click on the face") and "part" in found.scene.names()
+        await work.preview.put(*on(found, (0.0, 0.0, 5.0)))
+        assert work.preview._task is not None
+        await work.preview._task
+        assert found.tell.bad and found.tell.hint.startswith("It cannot be pasted there: ")
+        assert "part" in found.scene.names() and found.tell.busy == "", "another face may be clicked"
+        await work.preview.put(0.001, 0.001)
+        assert found.tell.hint.startswith("There is no part here")
+
+    asyncio.run(story())
     with pytest.raises(ValueError, match="expected a part with a ridge"):
         asyncio.run(work.take("part", "", tmp_path))
     cq.exporters.export(cq.Workplane().rarray(30, 1, 2, 1).box(10, 10, 10), str(path))

@@ -40,6 +40,12 @@ def affine_poles(ridge: Ridge) -> AffinePoles:
     """
     flat = ridge.resized(h=0, w=1).surface().poles
     slim = ridge.resized(h=0, w=0.5).surface().poles
+    if slim.shape != flat.shape:
+        raise ValueError(
+            f"expected poles that are affine in h and w, got {flat.shape[1]} across at w=1 and "
+            f"{slim.shape[1]} at w=0.5: the ridge stands on a curved base; export the surface at fixed "
+            "rates instead"
+        )
     per_width = 2 * (flat - slim)
     largest = float((ridge.border / LEAST_BORDER / ridge.width).min())
     poles = AffinePoles(flat - per_width, ridge.surface().poles - flat, per_width, largest)

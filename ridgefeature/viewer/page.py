@@ -13,15 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.curvilinear import local_coordinates
 from ridgefeature.diagnosis import Diagnosis
 from ridgefeature.readable import ends, kind, number, round_below, templates
 from ridgefeature.readable import rows as trust
+from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan
 from ridgefeature.viewer import curves
 from ridgefeature.viewer.colours import Pixels, by_deviation, by_height
 from ridgefeature.viewer.pointing import Pointing
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.session import LEAST, MOST, Feature, History, Session
+from ridgefeature.viewer.sizes import Sizes
 
 Array = NDArray[np.float64]
 HINT = "Click on a ridge to register it. Drag turns, the wheel zooms, Shift with drag pans."
@@ -34,8 +37,8 @@ TOLD: dict[str, Any] = {
     "host_name": "", "coloured": False,
 }  # fmt: skip
 """What the page knows, and how it begins."""
-FIELDS = ("h", "w", "height", "width")
-"""What of it is changed there."""
+_ON = 0.4
+"""Distance from a spine, in widths, up to which a place is on its ridge."""
 
 
 class Page:
@@ -49,7 +52,8 @@ class Page:
         """By id of a registered ridge, what its scan tells of it."""
         self.pointing = Pointing(tell, scene)
         self._shown: set[str] = set()
-        self._fields: dict[str, Any] = {}
+        self.sizes = Sizes(self)
+        self._painted: Ridge | None = None
         self._own_colours: Pixels | None = None
 
     @property
@@ -70,13 +74,20 @@ class Page:
         self.found.clear()
         self._shown.clear()
         self.scene.show_points(scan.points)
-        few = "" if len(self.scene.still) == len(scan) else f", {len(self.scene.still):,} of them drawn"
-        size = " x ".join(number(x, 3) for x in np.ptp(scan.bounds, axis=0))
-        self.tell.scan_name, self.tell.unit = name, scan.unit
-        self.tell.scan_note = f"{len(scan):,} points{few}, {size} {scan.unit}"
+        self.tell.scan_name = name
+        self._tell_scan()
         self.tell.pasting, self._own_colours, self.tell.coloured = False, None, False
         self.say(HINT)
         self.colour("height")
+
+    def _tell_scan(self) -> None:
+        scan = self.scan
+        if scan is None:
+            return
+        few = "" if len(self.scene.still) == len(scan) else f", {len(self.scene.still):,} of them drawn"
+        size = " x ".join(number(x, 3) for x in np.ptp(scan.bounds, axis=0))
+        self.tell.unit = scan.unit
+        self.tell.scan_note = f"{len(scan):,} points{few}, {size} {scan.unit}"
 
     def do(self, session: Session, kind: str = "") -> None:
         """Go on to another session, as `History.do`, and show it."""
@@ -95,6 +106,30 @@ class Page:
         self.history.now = self.session.choosing(name)
         self.refresh()
 
+    def ridge_at(self, place: Array) -> str | None:
+        """The name of a ridge that is shown and has this place (3,) of the scan between its feet."""
+        for feature in reversed(self.session.features):
+            ridge = feature.registered
+            s, y, z = (float(x[0]) for x in local_coordinates(ridge, place[None]))
+            half, high = (
+                float(np.interp(s, ridge.arc_length, np.abs(x))) for x in (ridge.width, ridge.height)
+            )
+            if feature.shown and 0.0 <= s <= ridge.length and abs(y) < _ON * half and abs(z) < 2.0 * high:
+                return feature.name
+        return None
+
+    def set_unit(self, unit: str) -> None:
+        """The scan's coordinates are in another unit; only as long as there are no ridges."""
+        if self.scan is None or unit == self.scan.unit:
+            return
+        if self.session.features:
+            self.say("The unit of a scan is chosen before its ridges; remove them first.", bad=True)
+        else:
+            self.scan = Scan(self.scan.points, unit, self.scan.source)
+            self._tell_scan()
+        self.tell.unit = self.scan.unit
+        self.colour(self.tell.colouring)
+
     def toggle(self, name: str) -> None:
         """Show a ridge, or hide it."""
         self.do(self.session.changed(name, shown=not self.session[name].shown))
@@ -108,75 +143,12 @@ class Page:
     def rename(self, name: str, to: str) -> None:
         self.do(self.session.renamed(name, to))
 
-    # Height and width.
-
-    def slide(self, rate: str, value: float) -> None:
-        """Another rate, "h" or "w", for the chosen ridge or its stretch; a slider's steps are one undo."""
-        if self.session.chosen is not None and rate in ("h", "w"):
-            name = self.session.chosen
-            self.history.do(self.session.changed(name, **{rate: float(value)}), f"{rate} of {name}")
-            if not self.tell.pasting:
-                self.scene.coarse(True)
-            self.refresh()
-
-    def absolute(self, what: str, value: float) -> None:
-        """Another largest "height" or width of the chosen ridge, in the scan's unit."""
-        feature = self.feature
-        if feature is not None and what in ("height", "width"):
-            usual = _largest(getattr(feature.registered, what))
-            self.slide(what[0], float(value) / usual)
-
-    def edited(self, told: dict[str, Any]) -> bool:
-        """Fields of the page, FIELDS, as they are there now; whether one was changed there: the first counts."""
-        changed = next((name for name in FIELDS if told[name] != self._fields.get(name)), None)
-        if changed is None or self.feature is None:
-            return False
-        value = told[changed]
-        try:
-            wanted = float(value)
-        except (TypeError, ValueError):
-            wanted = float("nan")
-        try:
-            if changed in ("h", "w"):
-                self.slide(changed, wanted)
-            else:
-                self.absolute(changed, wanted)
-        except ValueError as error:
-            self.say(str(error), bad=True)
-            self.refresh()
-        return True
-
     def rest(self) -> None:
         """Nothing moves any more: all points are drawn."""
         if not self.tell.pasting:
             self.scene.coarse(False)
         self.draw()
         self.scale()
-
-    def reset(self) -> None:
-        """The chosen ridge as it was registered."""
-        if self.session.chosen is not None:
-            self.do(self.session.changed(self.session.chosen, h=1.0, w=1.0, between=None))
-
-    def stretch(self, first: float, last: float) -> None:
-        """The rates hold between two places of the curves, in parts of their width; all along if alike."""
-        feature = self.feature
-        if feature is None:
-            return
-        length = feature.registered.length
-        places = [curves.place_of(x, length) for x in sorted((first, last))]
-        low, high = (x if x is not None else e for x, e in zip(places, (0.0, length), strict=True))
-        try:
-            feature.registered.resized(h=1.1, between=(low, high))
-        except ValueError:
-            self.say("This stretch is too short to be changed; drag further over the curves.", bad=True)
-            return
-        self.do(self.session.changed(feature.name, between=(low, high)))
-
-    def whole(self) -> None:
-        """The rates hold along the whole ridge."""
-        if self.session.chosen is not None:
-            self.do(self.session.changed(self.session.chosen, between=None))
 
     # What is seen.
 
@@ -214,6 +186,7 @@ class Page:
             self.refresh()
             return
         deviation = by == "deviation" and feature is not None
+        self._painted = feature.registered if feature is not None and deviation else None
         if deviation and feature is not None:
             colouring = by_deviation(feature.registered.distance(points))
         else:
@@ -269,6 +242,9 @@ class Page:
         tell.chosen = session.chosen or ""
         tell.can_undo, tell.can_redo = bool(self.history.before), bool(self.history.after)
         self._tell_feature()
+        wanted = None if self.feature is None else self.feature.registered
+        if tell.colouring == "deviation" and self._painted is not wanted:
+            self.colour("deviation")
         self.draw()
         self.scale()
 
@@ -279,9 +255,7 @@ class Page:
             self.scene.mark(None, "place")
             return
         ridge = feature.ridge
-        height, width = (f"{_largest(x):.5g}" for x in (ridge.height, ridge.width))
-        self._fields = dict(zip(FIELDS, (feature.h, feature.w, height, width), strict=True))
-        tell.h, tell.w, tell.height, tell.width = self._fields.values()
+        self.sizes.tell(feature)
         low, high = feature.between or (0.0, ridge.length)
         tell.stretch = "" if feature.between is None else f"s = {number(low)} to {number(high)} {ridge.unit}"
         tell.profile = curves.profile(ridge, feature.between)
@@ -304,17 +278,14 @@ class Page:
 
     def triggers(self) -> dict[str, Callable[..., None]]:
         """All that is done at once, by the name that the page calls it."""
+        sizes = self.sizes
         own = (
-            self.undo, self.redo, self.choose, self.toggle, self.remove, self.rename, self.rest, self.reset,
-            self.stretch, self.whole, self.hover, self.point, self.step, self.colour, self.theme,
+            self.undo, self.redo, self.set_unit, self.choose, self.toggle, self.remove, self.rename,
+            self.rest, self.hover, self.point, self.step, self.colour, self.theme,
+            sizes.reset, sizes.stretch, sizes.whole,
         )  # fmt: skip
         moves = {how: partial(self.look, how) for how in ("fit", "turn", "zoom", "pan")}
         return {**{f.__name__: f for f in own}, **moves, "help": self._help}
 
     def _help(self) -> None:
         self.tell.help = not self.tell.help
-
-
-def _largest(values: Array) -> float:
-    """The value that is farthest from 0."""
-    return float(values[np.argmax(np.abs(values))])

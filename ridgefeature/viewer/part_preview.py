@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import sys
+import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -13,10 +15,13 @@ from numpy.typing import NDArray
 
 from ridgefeature.viewer import preview
 from ridgefeature.viewer.page import HINT, Page
+from ridgefeature.viewer.session import Feature
 
 T = TypeVar("T")
 Array = NDArray[np.float64]
-_STILL = "Click on the part to put the ridge there; the sliders are live."
+_LIVE = "Click on the part to put the ridge there; the sliders are live."
+_CHOOSE = "Click on the face where the ridge is to stand."
+_CHECKING = "one closed valid solid; looking for self-intersections"
 
 
 async def aside(work: Callable[[], T]) -> T:
@@ -32,6 +37,7 @@ class PartPreview:
         self.part: preview.Part | None = None
         self._file: Any = None
         self._host: tuple[Any, ...] = ()
+        """Kind, ridge, solid and the place where the ridge goes first."""
         self._at: Array | None = None
         self._task: asyncio.Task[None] | None = None
         self._again = False
@@ -41,38 +47,36 @@ class PartPreview:
         self._file = await aside(lambda: preview.host_from(path))
         with self.page.tell as tell:
             tell.host_name, tell.host = name, "file"
-        self._host = ()
         if self.page.feature is not None:
             await self.paste()
 
     async def paste(self) -> None:
-        """Paste, and show the part instead of the scan."""
+        """Show a part with the ridge on it instead of the scan; a file's without, until a face is chosen."""
         page = self.page
         if page.feature is None:
             return
         if not page.tell.pasting:
             page.scene.keep_camera()
-        self._host = ()
-        self._at = None
+        self._host, self._at, self.part = (), None, None
         with page.tell:
-            page.tell.pasting, page.tell.busy = True, "Pasting"
-        await self._work(fit=True)
+            page.tell.pasting, page.tell.part_note = True, ""
+        self._begin()
+        if self._task is not None:
+            await self._task
 
     def again(self) -> None:
         """Something changed; paste anew if the part is shown."""
-        if not self.page.tell.pasting:
-            return
-        if self.page.feature is None:
+        if self.page.tell.pasting and self.page.feature is None:
             self.leave()
-        elif self._task is not None and not self._task.done():
-            self._again = True
-        else:
-            self._task = asyncio.get_running_loop().create_task(self._work())
+        elif self.page.tell.pasting:
+            self._begin()
 
     async def put(self, across: float, down: float) -> None:
         """Paste at a place on the view, in parts of the picture from its upper left."""
         place = self.page.scene.pick_part(across, down)
-        if place is not None:
+        if place is None:
+            self.page.say("There is no part here; click on it.", bad=True)
+        elif self._host:
             # On the ridge that is there now, the click means the host under it.
             self._at = preview.nearest_on(self._host[2], place)
             self.again()
@@ -80,55 +84,97 @@ class PartPreview:
     def leave(self) -> None:
         """Back to the scan."""
         page = self.page
-        page.tell.pasting = False
+        page.tell.pasting, self._again = False, False
         page.scene.hide("part")
         page.scene.only_part(False)
         page.scene.restore_camera()
         page.say(HINT)
         page.refresh()
 
-    async def _work(self, fit: bool = False) -> None:
-        """Paste fast first, as long as things change, then with all checks."""
+    def _begin(self) -> None:
+        self._again = True
+        if self._task is None or self._task.done():
+            self._task = asyncio.get_running_loop().create_task(self._work())
+
+    async def _work(self) -> None:
         page = self.page
-        try:
-            for check in (False, True):
-                self._again = True
-                while self._again:
-                    self._again = False
-                    await self._once(check, fit)
-                    fit = False
-        except (ValueError, OSError) as error:
-            self.part = None
-            page.scene.hide("part")
-            page.tell.part_note = ""
-            page.say(f"It cannot be pasted: {error}", bad=True)
-            page.draw()
-        finally:
+        while self._again and page.tell.pasting:
+            self._again = False
+            with page.tell:
+                page.tell.busy, page.tell.count = "Pasting", 0
+            try:
+                await self._once()
+            except (ValueError, OSError) as error:
+                self.part, page.tell.part_note = None, ""
+                await self._show_host()
+                page.say(f"It cannot be pasted there: {error}", bad=True)
             with page.tell:
                 page.tell.busy = ""
 
-    async def _once(self, check: bool, fit: bool) -> None:
-        page = self.page
-        feature, kind = page.feature, str(page.tell.host)
+    async def _once(self) -> None:
+        page, feature = self.page, self.page.feature
         if feature is None:
             return
-        key = kind, id(feature.registered)
-        if self._host[:2] != key:
-            if kind == "file":
-                solid, at = self._file, None
-            else:
-                solid, at = await aside(lambda: preview.host_for(kind, feature.registered))
-            self._host = (*key, solid, at)
-            self._at = self._at if fit is False and self._at is not None else at
-        ridge = feature.registered.resized(h=feature.h, w=feature.w, between=feature.between)
-        make = partial(preview.pasted, ridge, self._host[2], self._at, 1.0, 1.0, check)
-        self.part = await aside(make)
+        await self._choose_host(feature)
+        if self._at is None:
+            await self._show_host()
+            page.say(_CHOOSE)
+            return
+        first = self.part is None
+        part = await aside(partial(preview.pasted, feature.ridge, self._host[2], self._at))
         if not page.tell.pasting:
             return
-        page.scene.show_part(self.part.points, self.part.host, self.part.grown)
-        if fit:
-            page.scene.look_at_part(self.part.points, self.part.grown)
-        with page.tell:
-            page.tell.part_note = self.part.told
-            page.say(_STILL)
+        self.part = part
+        page.scene.show_part(part.points, part.host, part.grown)
+        if first and self._host[3] is not None:
+            page.scene.look_at_part(part.points, part.grown)
+        page.say(_LIVE)
         page.draw()
+        await self._check(part)
+
+    async def _choose_host(self, feature: Feature) -> None:
+        kind = str(self.page.tell.host)
+        if self._host[:2] == (kind, feature.registered):
+            return
+        if kind == "file":
+            if self._file is None:
+                raise ValueError("expected the STEP file of a part, there is none; open one")
+            solid, at = self._file, None
+        else:
+            solid, at = await aside(lambda: preview.host_for(kind, feature.registered))
+        same = bool(self._host) and kind == "file"
+        self._host, self._at = (kind, feature.registered, solid, at), self._at if same else at
+
+    async def _show_host(self) -> None:
+        """The host without a ridge, so that a face can be clicked."""
+        page = self.page
+        if self._host and page.tell.pasting:
+            bare = await aside(lambda: preview.bare(self._host[2]))
+            first = not any(name.startswith("part") for name in page.scene.names())
+            page.scene.show_part(bare.points, bare.host, bare.grown)
+            if first:
+                page.scene.fit()
+            page.draw()
+
+    async def _check(self, part: preview.Part) -> None:
+        """The thorough checks, given up when something changes."""
+        page = self.page
+        with page.tell:
+            page.tell.part_note, page.tell.busy = f"{_CHECKING}; {part.told}", "Checking the part"
+        with tempfile.TemporaryDirectory(prefix="ridgefeature-") as folder:
+            path = Path(folder) / "part.brep"
+            await aside(lambda: part.solid.exportBrep(str(path)))
+            words = sys.executable, "-m", "ridgefeature.viewer.check_part", str(path)
+            process = await asyncio.create_subprocess_exec(*words, stdout=asyncio.subprocess.PIPE)
+            done = asyncio.ensure_future(process.communicate())
+            while not done.done():
+                await asyncio.wait({done}, timeout=0.05)
+                if self._again or not page.tell.pasting:
+                    process.kill()
+                    await done
+                    return
+        told = done.result()[0].decode().strip()
+        if told or process.returncode:
+            raise ValueError(told or "the checks of the part failed")
+        with page.tell:
+            page.tell.part_note = f"one closed valid solid, checked for self-intersections; {part.told}"

@@ -17,7 +17,7 @@ Corners = NDArray[np.int64]
 HOSTS = ("plane", "cylinder", "sphere")
 _ROOM = 1.1
 """Size of a host's face, in that of what a ridge may need."""
-_FINE, _BEND = 4e-4, 0.15
+_FINE, _BEND = 1e-3, 0.25
 """Distance of triangles from the surface, in the part's size; angle between two of them."""
 
 
@@ -32,7 +32,7 @@ class Part:
     grown: Corners
     """(m, 3) corners of the triangles of the host's own faces, and of the ridge's."""
     told: str
-    """Volumes and how it was made, in words."""
+    """Volumes in words."""
 
 
 def host_for(kind: str, ridge: Ridge) -> tuple[Any, Array]:
@@ -82,26 +82,30 @@ def nearest_on(host: Any, place: Array) -> Array:
     return np.array([found.X(), found.Y(), found.Z()])
 
 
-def pasted(ridge: Ridge, host: Any, at: Array | None, h: float, w: float, check: bool = True) -> Part:
-    """The ridge on the face of a host that is nearest to a place (3,), or on its largest.
+def pasted(ridge: Ridge, host: Any, at: Array) -> Part:
+    """The ridge on the face of a host that is nearest to a place (3,).
 
-    check: whether the solid is searched for self-intersections, too. Raises ValueError as `cad_export.paste`.
+    It has passed the fast certificate of `cad_export.paste`, not its search for self-intersections. Raises
+    ValueError as that does.
     """
     import cad_export as cx
 
     report: dict[str, Any] = {}
-    solid = cx.paste(ridge, host, at=at, h=h, w=w, check=check, report=report)
-    grown = [face for face, _ in cx.carried_by(solid)]
-    checked = "one closed valid solid, checked for self-intersections" if check else "one closed valid solid"
-    volumes = f"{report['volume_added']:+,.4g} mm3 by the ridge, {report['volume_expected']:+,.4g} expected"
-    told = f"{checked}; {volumes}"
-    return Part(solid, *_triangles(solid, grown), told)
+    solid = cx.paste(ridge, host, at=at, check=False, report=report)
+    told = f"{report['volume_added']:+,.4g} mm3 by the ridge, {report['volume_expected']:+,.4g} expected"
+    return Part(solid, *_triangles(solid, [face for face, _ in cx.carried_by(solid)]), told)
+
+
+def bare(host: Any) -> Part:
+    """A host without a ridge."""
+    return Part(host, *_triangles(host, []), "")
 
 
 def _triangles(solid: Any, grown: list[Any]) -> tuple[Array, Corners, Corners]:
-    box = solid.BoundingBox()
+    import cadquery as cq
+
+    box = cq.BoundBox._fromTopoDS(solid.wrapped, optimal=False)
     tolerance, first = _FINE * box.DiagonalLength, 0
-    solid.mesh(tolerance, _BEND)
     places: list[Array] = []
     corners: tuple[list[Corners], list[Corners]] = ([], [])
     for face in solid.Faces():

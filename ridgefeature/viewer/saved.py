@@ -32,6 +32,8 @@ def save(path: Path, scan: Scan | None, session: Session) -> None:
                 np.lib.format.write_array(file, np.asarray(scan.points), allow_pickle=False)
         for k, feature in enumerate(session.features):
             archive.writestr(f"{k}.ridge.json", json.dumps(to_document(feature.registered)))
+            if feature.before is not None:
+                archive.writestr(f"{k}.before.json", json.dumps(to_document(feature.before)))
 
 
 def load(path: Path) -> tuple[Scan | None, Session]:
@@ -78,7 +80,10 @@ def _session(archive: zipfile.ZipFile, told: dict[str, Any]) -> Session:
         ridge = from_document(json.loads(archive.read(f"{k}.ridge.json")))
         x, y, z = map(float, own["pick"])
         between = None if own["between"] is None else (float(own["between"][0]), float(own["between"][1]))
-        rates = {"h": float(own["h"]), "w": float(own["w"]), "between": between, "shown": bool(own["shown"])}
+        rates: dict[str, Any] = {"h": float(own["h"]), "w": float(own["w"]), "between": between}
+        rates["shown"] = bool(own["shown"])
+        if f"{k}.before.json" in archive.namelist():
+            rates["before"] = from_document(json.loads(archive.read(f"{k}.before.json")))
         name = str(own["name"])
         unchanged = Session((Feature(name, ridge, (x, y, z)),))
         features.append(unchanged.changed(name, **rates)[name])

@@ -5,16 +5,19 @@ from __future__ import annotations
 import asyncio
 import os
 import secrets
+import sys
 import tempfile
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ridgefeature.scan import MILLIMETRES
 from ridgefeature.viewer.guard import LOOPBACK, add_headers, guard
-from ridgefeature.viewer.page import FIELDS, TOLD, Page
+from ridgefeature.viewer.page import HINT, TOLD, Page
 from ridgefeature.viewer.routes import routes
 from ridgefeature.viewer.scene import Scene
+from ridgefeature.viewer.sizes import FIELDS
 from ridgefeature.viewer.work import Work
 
 UPLOAD = 2**30
@@ -49,7 +52,7 @@ def serve(
 
     @server.state.change(*FIELDS)
     def edited(**told: Any) -> None:
-        if page.edited({field: told[field] for field in FIELDS}):
+        if page.sizes.edited({field: told[field] for field in FIELDS}):
             work.preview.again()
 
     with tempfile.TemporaryDirectory(prefix="ridgefeature-") as folder:
@@ -61,6 +64,7 @@ def serve(
             web.app.add_routes(routes(work, Path(folder), upload))
 
         async def begun(**_: Any) -> None:
+            asyncio.get_running_loop().set_exception_handler(_unless_gone)
             address = f"http://{host}:{server.port}/?token={token}"
             ready(address)
             if open_browser:
@@ -85,6 +89,7 @@ async def _opened(work: Work, scan: Path, unit: str | None) -> None:
     try:
         await work.open(scan, scan.name, unit)
     except (ValueError, OSError) as error:
+        print(f"ridgefeature: {error}", file=sys.stderr, flush=True)
         with work.page.tell:
             work.page.say(str(error), bad=True)
 
@@ -95,7 +100,9 @@ def _markup(server: Any, scene: Scene) -> Any:
     from trame.widgets import html
     from trame.widgets import vtk as vtk_widgets
 
-    server.state.update({**TOLD, "naming": "", "new_name": "", "trame__title": "ridgefeature"})
+    server.state.update(
+        {**TOLD, "naming": "", "new_name": "", "units": list(MILLIMETRES), "trame__title": "ridgefeature"}
+    )
     server.enable_module(
         {"serve": {"own": str(_HERE / "assets")}, "scripts": ["own/page.js"], "styles": ["own/page.css"]}
     )
@@ -128,7 +135,8 @@ def _triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
 
         return done
 
-    changing = (page.reset, page.stretch, page.whole, page.undo, page.redo, page.choose)
+    sizes = page.sizes
+    changing = sizes.reset, sizes.stretch, sizes.whole, page.undo, page.redo, page.choose, page.remove
     return {
         **{name: then_pasted(what) for name, what in page.triggers().items()},
         "click": begin(work.click),
@@ -141,12 +149,22 @@ def _triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
     }
 
 
+def _unless_gone(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """A page that was closed while a picture was on its way is no fault."""
+    if not isinstance(context.get("exception"), ConnectionError):
+        loop.default_exception_handler(context)
+
+
 def _told(page: Page, what: Callable[..., None], *values: Any) -> None:
-    """Done; what was wrong with it is told on the page."""
+    """Done; what was wrong with it is told on the page, until something goes right."""
+    wrong = page.tell.bad
     try:
         what(*values)
     except (ValueError, TypeError, KeyError) as error:
         page.say(str(error), bad=True)
+    else:
+        if wrong and page.tell.bad and what not in (page.hover, page.point):
+            page.say("" if page.tell.pasting else HINT)
 
 
 async def _reported(page: Page, what: Callable[..., Any], *values: Any) -> None:

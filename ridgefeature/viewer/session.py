@@ -24,13 +24,25 @@ class Feature:
     between: tuple[float, float] | None = None
     """Arc lengths between which the rates hold; None: along the whole ridge."""
     shown: bool = True
+    before: Ridge | None = None
+    """What the rates are of: as it was changed along other stretches; None: as registered."""
+
+    @property
+    def begun(self) -> Ridge:
+        """The ridge at rates of 1."""
+        return self.registered if self.before is None else self.before
 
     @cached_property
     def ridge(self) -> Ridge:
-        """As it is with these rates."""
+        """As it is with these rates. Raises ValueError where one is more than there is room for."""
         if (self.h, self.w) == (1.0, 1.0):
-            return self.registered
-        return self.registered.resized(h=self.h, w=self.w, between=self.between)
+            return self.begun
+        return self.begun.resized(h=self.h, w=self.w, between=self.between)
+
+    def along(self, between: tuple[float, float] | None) -> Feature:
+        """The same ridge, whose rates from now on hold between other arc lengths, all along if None."""
+        before = None if self.ridge is self.registered else self.ridge
+        return replace(self, h=1.0, w=1.0, between=between, before=before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +69,20 @@ class Session:
         return Session((*self.features, Feature(name, registered, pick)), name)
 
     def changed(self, name: str, /, **values: object) -> Session:
-        """With other values of one ridge. Raises ValueError where a rate is out of reach."""
+        """With other values of one ridge. Raises ValueError where a rate is out of reach, or of room."""
         for rate in ("h", "w"):
             if rate in values and not LEAST <= float(str(values[rate])) <= MOST:
                 raise ValueError(
                     f"{rate}: expected a rate from {LEAST:g} to {MOST:g}, got {values[rate]}; give another"
                 )
-        new = replace(self[name], **values)  # type: ignore[arg-type]
+        return self._with(name, replace(self[name], **values))  # type: ignore[arg-type]
+
+    def along(self, name: str, between: tuple[float, float] | None) -> Session:
+        """With one ridge's rates at 1 between other arc lengths; what was changed before stays."""
+        return self._with(name, self[name].along(between))
+
+    def _with(self, name: str, new: Feature) -> Session:
+        new.ridge.surface()  # raises where there is none
         return replace(self, features=tuple(new if f.name == name else f for f in self.features))
 
     def renamed(self, name: str, to: str) -> Session:

@@ -19,7 +19,7 @@ import cadquery as cq
 import cad_export as cx
 import ridgefeature as rf
 
-h = {h:g}  # height and width as rates: 1 is as registered
+h = {h:g}  # height and width as rates: 1 is as in the feature file
 w = {w:g}
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
@@ -77,7 +77,7 @@ def _script(feature: Feature, scan: Scan | None, path: Path) -> None:
 
     stem = stem_of(feature.name)
     part = path.with_name(f"{stem}.ridge.json")
-    feature.registered.save(part)
+    feature.begun.save(part)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(f"{stem}.py", script(feature))
         archive.write(part, part.name)

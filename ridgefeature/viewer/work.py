@@ -89,11 +89,17 @@ class Work:
         if page.scan is None:
             return
         if self.busy or not self._ready:
-            page.say(f"Not yet: {page.tell.busy or 'busy'}. Click again then.", bad=True)
+            with page.tell:
+                page.say(f"One thing at a time: {page.tell.busy.lower()}. Click again then.", bad=True)
             return
         place = page.scene.pick(across, down)
         if place is None:
             page.say("There is no scan point here; click on the scan.", bad=True)
+            return
+        here = page.ridge_at(place)
+        if here is not None:
+            page.choose(here)
+            page.say(f"This is {here}. To register it anew, remove it first.")
             return
         page.scene.mark(place, "pick", 11.0)
         at = (float(place[0]), float(place[1]), float(place[2]))
@@ -150,7 +156,18 @@ class Work:
             self.march.stop()
 
     async def take(self, kind: str, name: str, folder: Path) -> Path:
-        """Write what can be taken away; "page" is the whole state. Raises ValueError as `takeaway.write`."""
+        """Write what can be taken away; "page" is the whole state.
+
+        What cannot be written is told on the page, too. Raises ValueError or OSError then.
+        """
+        try:
+            return await self._taken(kind, name, folder)
+        except (ValueError, OSError) as error:
+            with self.page.tell:
+                self.page.say(f"This cannot be taken away: {error}", bad=True)
+            raise
+
+    async def _taken(self, kind: str, name: str, folder: Path) -> Path:
         page = self.page
         scan, session = page.scan, page.session
         if kind == "page":

@@ -39,7 +39,7 @@
 
   // The curves: pointing marks the place, dragging chooses a stretch.
   let from = null;
-  document.addEventListener("pointerdown", (e) => { const plot = on(e, ".plot"); from = plot ? part(e, plot)[0] : null; });
+  document.addEventListener("pointerdown", (e) => { const plot = on(e, ".plot"); from = plot ? part(e, plot)[0] : null; if (plot) plot.setPointerCapture(e.pointerId); });
   document.addEventListener("pointermove", (e) => {
     const plot = on(e, ".plot");
     if (plot && Date.now() - hovered >= 50) { hovered = Date.now(); tell("point", part(e, plot)[0]); }

@@ -1,0 +1,112 @@
+"""Height and width of the ridge that is chosen on the page, all along or in a stretch."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.viewer import curves
+from ridgefeature.viewer.session import LEAST, MOST, Feature
+
+if TYPE_CHECKING:
+    from ridgefeature.viewer.page import Page
+
+Array = NDArray[np.float64]
+FIELDS = ("h", "w", "height", "width")
+"""What of it is changed there."""
+
+
+class Sizes:
+    """What sliders and fields of a page do. fields: what the page was told that they are."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.fields: dict[str, Any] = {}
+
+    def tell(self, feature: Feature) -> None:
+        """Tell the page what its sliders and fields are."""
+        height, width = (_largest(x, feature) for x in (feature.ridge.height, feature.ridge.width))
+        told = feature.h, feature.w, f"{height:.5g}", f"{width:.5g}"
+        self.fields = dict(zip(FIELDS, told, strict=True))
+        tell = self.page.tell
+        tell.h, tell.w, tell.height, tell.width = told
+
+    def slide(self, rate: str, value: float) -> None:
+        """Another rate, "h" or "w", for the chosen ridge or its stretch; a slider's steps are one undo.
+
+        Raises ValueError where it is out of reach, or of room; nothing is changed then.
+        """
+        if self.page.session.chosen is not None and rate in ("h", "w"):
+            name = self.page.session.chosen
+            self.page.history.do(self.page.session.changed(name, **{rate: value}), f"{rate} of {name}")
+            if not self.page.tell.pasting:
+                self.page.scene.coarse(True)
+            self.page.refresh()
+
+    def absolute(self, what: str, value: float) -> None:
+        """Another largest "height" or "width" of the chosen ridge, or its stretch, in the scan's unit."""
+        feature = self.page.feature
+        if feature is None or what not in ("height", "width"):
+            return
+        usual = _largest(getattr(feature.begun, what), feature)
+        if usual and not LEAST <= value / usual <= MOST:
+            low, high = sorted((LEAST * usual, MOST * usual))
+            raise ValueError(f"{what}: expected {low:.4g} to {high:.4g} {self.page.tell.unit}, got {value:g}")
+        self.slide(what[0], value / usual if usual else 1.0)
+
+    def edited(self, told: dict[str, Any]) -> bool:
+        """Fields of the page, FIELDS, as they are now; whether one was changed there: the first counts."""
+        changed = next((name for name in FIELDS if told[name] != self.fields.get(name)), None)
+        if changed is None or self.page.feature is None:
+            return False
+        value = told[changed]
+        try:
+            wanted = float(value)
+        except (TypeError, ValueError):
+            wanted = float("nan")
+        try:
+            if changed in ("h", "w"):
+                self.slide(changed, wanted)
+            else:
+                self.absolute(changed, wanted)
+        except ValueError as error:
+            self.page.say(str(error), bad=True)
+            self.page.refresh()
+        return True
+
+    def reset(self) -> None:
+        """The chosen ridge as it was registered."""
+        if self.page.session.chosen is not None:
+            self.page.do(
+                self.page.session.changed(self.page.session.chosen, h=1.0, w=1.0, between=None, before=None)
+            )
+
+    def stretch(self, first: float, last: float) -> None:
+        """The rates hold between two places of the curves, in parts of their width; all along if alike."""
+        feature = self.page.feature
+        if feature is None:
+            return
+        length = feature.registered.length
+        places = [curves.place_of(x, length) for x in sorted((first, last))]
+        low, high = (x if x is not None else e for x, e in zip(places, (0.0, length), strict=True))
+        try:
+            feature.ridge.resized(h=1.01, between=(low, high))
+        except ValueError:
+            self.page.say("This stretch is too short to be changed; drag further over the curves.", bad=True)
+            return
+        self.page.do(self.page.session.along(feature.name, (low, high)))
+
+    def whole(self) -> None:
+        """The rates hold along the whole ridge."""
+        if self.page.session.chosen is not None:
+            self.page.do(self.page.session.along(self.page.session.chosen, None))
+
+
+def _largest(values: Array, feature: Feature) -> float:
+    """The value that is farthest from 0 where the ridge's rates hold."""
+    at = feature.registered.arc_length
+    low, high = feature.between or (0.0, float(at[-1]))
+    inside = values[(at >= low) & (at <= high)]
+    return float(inside[np.argmax(np.abs(inside))])
