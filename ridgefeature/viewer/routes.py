@@ -57,7 +57,16 @@ def routes(work: Work, folder: Path, limit: int) -> list[web.RouteDef]:
                 left.unlink()
             own.rmdir()
 
-    return [web.post("/open", open_file), web.get("/take", take)]
+    return [
+        web.post("/open", open_file),
+        web.get("/take", take),
+        web.post("/paraview/", _session),
+    ]
+
+
+async def _session(request: web.Request) -> web.Response:
+    """Where the page's client finds its session: it asks for a launcher's first."""
+    return web.json_response({"sessionURL": f"ws://{request.host}/ws"})
 
 
 async def _receive(request: web.Request, path: Path, limit: int) -> None:
