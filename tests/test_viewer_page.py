@@ -177,6 +177,18 @@ def test_stretches_add_up(found: Page) -> None:
     assert np.array_equal(found.feature.ridge.height, registered().height)
 
 
+def test_a_stretch_is_chosen_by_keys(found: Page) -> None:
+    length = registered().length
+    for part, which in ((0.3, 0), (0.7, 1)):
+        found.point(curves.part_of(part * length, length))
+        found.sizes.bound(which)
+    assert found.feature is not None
+    assert found.feature.between == pytest.approx((0.3 * length, 0.7 * length))
+    found.point(curves.part_of(0.8 * length, length))
+    found.sizes.bound(0)
+    assert found.feature.between == pytest.approx((0.8 * length, length)), "one beyond the other"
+
+
 def test_a_click_on_a_ridge_that_is_known_chooses_it(work: Work, found: Page) -> None:
     found.do(found.session.added(registered().resized(h=-1.0), PICK))
     found.toggle("groove 1")
@@ -296,6 +308,7 @@ def test_files_are_opened_by_name_in_the_working_folder_only(work: Work, tmp_pat
     for name in ("../other.npy", "/etc/passwd"):
         asyncio.run(work.open_by_name(name))
         assert page.tell.bad and "expected a file in" in page.tell.hint
+    assert work.files() == ["own.npy"]
     (tmp_path / "bad.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\n")
     asyncio.run(work.open_by_name("bad.ply"))
     assert page.tell.bad and "bad.ply" in page.tell.hint

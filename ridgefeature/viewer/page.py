@@ -282,7 +282,7 @@ class Page:
         own = (
             self.undo, self.redo, self.set_unit, self.choose, self.toggle, self.remove, self.rename,
             self.rest, self.hover, self.point, self.step, self.colour, self.theme,
-            sizes.reset, sizes.stretch, sizes.whole,
+            sizes.reset, sizes.stretch, sizes.bound, sizes.whole,
         )  # fmt: skip
         moves = {how: partial(self.look, how) for how in ("fit", "turn", "zoom", "pan")}
         return {**{f.__name__: f for f in own}, **moves, "help": self._help}

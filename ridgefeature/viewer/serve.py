@@ -44,9 +44,9 @@ def serve(
 
     server = get_server("ridgefeature", client_type="vue3")
     scene, token = Scene(), secrets.token_urlsafe(24)
-    view = _markup(server, scene)
-    page = Page(server.state, scene, view.update)
+    page = Page(server.state, scene, lambda: view.update())
     work = Work(page, Path.cwd())
+    view = _markup(server, scene, work.files())
     for name, what in _triggers(page, work).items():
         server.controller.trigger(name)(what)
 
@@ -94,15 +94,14 @@ async def _opened(work: Work, scan: Path, unit: str | None) -> None:
             work.page.say(str(error), bad=True)
 
 
-def _markup(server: Any, scene: Scene) -> Any:
-    """Lay the page out; returns its view."""
+def _markup(server: Any, scene: Scene, files: list[str]) -> Any:
+    """Lay the page out; returns its view. files: those of the working folder that it may open."""
     from trame.ui.html import DivLayout
     from trame.widgets import html
     from trame.widgets import vtk as vtk_widgets
 
-    server.state.update(
-        {**TOLD, "naming": "", "new_name": "", "units": list(MILLIMETRES), "trame__title": "ridgefeature"}
-    )
+    own = {"naming": "", "new_name": "", "units": list(MILLIMETRES), "trame__title": "ridgefeature"}
+    server.state.update(TOLD | own | {"files": files})
     server.enable_module(
         {"serve": {"own": str(_HERE / "assets")}, "scripts": ["own/page.js"], "styles": ["own/page.css"]}
     )
@@ -136,7 +135,16 @@ def _triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
         return done
 
     sizes = page.sizes
-    changing = sizes.reset, sizes.stretch, sizes.whole, page.undo, page.redo, page.choose, page.remove
+    changing = (
+        sizes.reset,
+        sizes.stretch,
+        sizes.bound,
+        sizes.whole,
+        page.undo,
+        page.redo,
+        page.choose,
+        page.remove,
+    )
     return {
         **{name: then_pasted(what) for name, what in page.triggers().items()},
         "click": begin(work.click),

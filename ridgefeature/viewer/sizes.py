@@ -98,6 +98,17 @@ class Sizes:
             return
         self.page.do(self.page.session.along(feature.name, (low, high)))
 
+    def bound(self, which: int) -> None:
+        """The rates hold from, 0, or up to, 1, the place that is pointed at."""
+        feature = self.page.feature
+        if feature is not None and which in (0, 1):
+            length = feature.registered.length
+            ends = list(feature.between or (0.0, length))
+            ends[which] = self.page.pointing.place(feature)
+            if ends[0] >= ends[1]:
+                ends[1 - which] = (0.0, length)[1 - which]
+            self.stretch(*(curves.part_of(s, length) for s in ends))
+
     def whole(self) -> None:
         """The rates hold along the whole ridge."""
         if self.page.session.chosen is not None:

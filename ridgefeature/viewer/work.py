@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.diagnosis import diagnose
 from ridgefeature.io.colours import Pixels, colours_at
-from ridgefeature.io.read import read_scan
+from ridgefeature.io.read import FORMATS, read_scan
 from ridgefeature.registration import NoRidgeError, register
 from ridgefeature.ridge import Ridge
 from ridgefeature.synthetic import Spiral
@@ -63,6 +63,11 @@ class Work:
                 scan = await aside(lambda: read_scan(path, unit=unit))
                 self.page.show_scan(scan, name)
                 self.page.own_colours(await aside(lambda: _colours(path, self.page.scene.still)))
+
+    def files(self) -> list[str]:
+        """Scans and saved pages in the working folder, by name."""
+        known = {*FORMATS, saved.SUFFIX}
+        return sorted(p.name for p in self.folder.iterdir() if p.suffix.lower() in known and p.is_file())
 
     async def open_by_name(self, name: str) -> None:
         """Open a file of the working folder, by its path in it."""

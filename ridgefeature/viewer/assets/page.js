@@ -70,6 +70,7 @@
       const act = (e.shiftKey && shifted[e.key]) || view_keys[e.key];
       if (act) { tell(...act); e.preventDefault(); e.stopPropagation(); return; }
     }
+    if (on(e, ".plot") && (e.key === "[" || e.key === "]")) { tell("bound", e.key === "[" ? 0 : 1); return; }
     if (on(e, ".plot") && (e.key === "ArrowLeft" || e.key === "ArrowRight")) {
       tell("step", e.key === "ArrowLeft" ? -1 : 1); e.preventDefault(); return;
     }
