@@ -203,7 +203,7 @@ def test_any_points_give_a_ridge_or_a_value_error(seed, kind):
 
 
 @pytest.mark.parametrize("kind", ["ridge", "groove"])
-@pytest.mark.parametrize("first", [1200, 1240, 1280])
+@pytest.mark.parametrize("first", [1200, 1240])
 def test_a_groove_is_never_found_as_a_ridge_nor_a_ridge_as_a_groove(first, kind):
     wrong = []
     for seed in range(first, first + 40):

@@ -127,7 +127,7 @@ def cube(rng: np.random.Generator, noise: float) -> np.ndarray:
     return points + rng.normal(0, noise, points.shape)
 
 
-@pytest.mark.parametrize("kind", ["ridge", "auto"])
+@pytest.mark.parametrize("kind", ["auto"])  # which looks for ridges, too
 @pytest.mark.parametrize(("body", "click"), [(pipe, (50, 10, 0)), (cube, (20, 20, 0)), (cube, (20, 20, 20))])
 def test_there_is_no_ridge_on_closed_bodies(body, click, kind: str) -> None:
     """Each template may explain its window there, but no fit of the whole goes through all of them."""

@@ -32,7 +32,7 @@ def test_it_serves_until_it_is_interrupted(tmp_path: Path) -> None:
 
 
 def test_without_the_token_there_is_no_page(tmp_path: Path) -> None:
-    with served(tmp_path) as address:
+    with served(tmp_path, "--upload", "1") as address:
         bare = address.split("?")[0]
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(bare)
@@ -43,6 +43,8 @@ def test_without_the_token_there_is_no_page(tmp_path: Path) -> None:
             opener.open(
                 urllib.request.Request(bare + "index.html", headers={"Origin": "http://evil.example"})
             )
+        with pytest.raises(urllib.error.HTTPError, match="413"):
+            opener.open(urllib.request.Request(bare + "open?name=a.ply", data=bytes(2**20 + 1)))
         for path in ("own/../../../etc/passwd", "own/%2e%2e/%2e%2e/serve.py", "../../etc/passwd"):
             with pytest.raises(urllib.error.HTTPError, match=r"40[34]"):
                 opener.open(bare + path)

@@ -137,12 +137,3 @@ def test_files_that_are_sent_and_parts_that_are_shown(tmp_path: Path) -> None:
             "() => fetch('/open?name=a.ply', {method: 'POST', body: new Uint8Array(5e6)}).then(r => r.status)"
         )
         assert status == 400, "five megabytes of nothing are no scan"
-
-
-def test_the_page_refuses_what_is_too_large(tmp_path: Path) -> None:
-    with served(tmp_path, "--upload", "1") as address, opened(address) as page:
-        page.wait_for_selector("#empty")
-        status = page.evaluate(
-            "() => fetch('/open?name=a.ply', {method: 'POST', body: new Uint8Array(2e6)}).then(r => r.status)"
-        )
-        assert status == 413

@@ -18,6 +18,7 @@ pytest.importorskip("vtkmodules")
 from ridgefeature.viewer import curves, preview, saved
 from ridgefeature.viewer.marching import March
 from ridgefeature.viewer.page import TOLD, Page
+from ridgefeature.viewer.part_preview import PartPreview
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.session import Session
 from ridgefeature.viewer.sizes import FIELDS
@@ -55,6 +56,16 @@ def found(page: Page) -> Page:
 @pytest.fixture
 def work(page: Page, tmp_path: Path) -> Iterator[Work]:
     yield Work(page, tmp_path)
+
+
+@pytest.fixture
+def unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts are shown without the thorough checks, which take seconds; one test has them."""
+
+    async def nothing(self: PartPreview, part: preview.Part) -> None:
+        self.page.tell.part_note = part.told
+
+    monkeypatch.setattr(PartPreview, "_check", nothing)
 
 
 def on(page: Page, place: tuple[float, float, float]) -> tuple[float, float]:
@@ -326,24 +337,28 @@ def test_a_page_is_saved_and_opened_again(work: Work, found: Page, tmp_path: Pat
 
 
 @pytest.mark.parametrize("kind", preview.HOSTS)
-def test_the_ridge_is_seen_on_a_part(work: Work, found: Page, kind: str, tmp_path: Path) -> None:
+def test_the_ridge_is_seen_on_a_part(work: Work, found: Page, kind: str, unchecked: None) -> None:
     found.sizes.slide("h", 1.2)
     found.tell.host = kind
     asyncio.run(work.preview.paste())
     part = work.preview.part
     assert part is not None and found.tell.pasting and found.tell.busy == ""
-    assert "checked for self-intersections" in found.tell.part_note
-    assert part.solid.isValid() and part.solid.Volume() > 0
+    assert part.solid.isValid() and part.solid.Volume() > 0 and len(part.grown) > 100
     assert not found.scene._actors["still"].GetVisibility()
-    path = asyncio.run(work.take("part", "", tmp_path))
-    import cad_export as cx
-
-    assert cx.load(path).height.max() > 0
     work.preview.leave()
     assert found.scene._actors["still"].GetVisibility() and "part" not in found.scene.names()
 
 
-def test_a_part_follows_the_sliders_and_the_click(work: Work, found: Page) -> None:
+def test_a_part_is_checked_told_and_taken_away(work: Work, found: Page, tmp_path: Path) -> None:
+    asyncio.run(work.preview.paste())
+    assert "checked for self-intersections" in found.tell.part_note
+    path = asyncio.run(work.take("part", "", tmp_path))
+    import cad_export as cx
+
+    assert np.allclose(cx.load(path).height, registered().height)
+
+
+def test_a_part_follows_the_sliders_and_the_click(work: Work, found: Page, unchecked: None) -> None:
     async def story() -> list[float]:
         await work.preview.paste()
         volumes = []
