@@ -28,7 +28,7 @@ def wall(noise: float, strays: float = 0.0) -> np.ndarray:
     return points
 
 
-@pytest.mark.parametrize("strays", [0.0, 0.1])
+@pytest.mark.parametrize("strays", [0.1])
 def test_a_wall_is_found_from_any_place_on_it(strays):
     points = wall(0.5, strays)
     clicks = [(0, 0, HEIGHT), (5, 3.7, 2.0), (-9, -3.6, 7.0), (12, 3.4, 11.0), (20, -3.4, 12.0)]

@@ -188,7 +188,7 @@ def cloud(seed: int) -> np.ndarray:
 
 
 @given(st.integers(0, 10**7), st.sampled_from(["ridge", "groove", "auto"]))
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_any_points_give_a_ridge_or_a_value_error(seed, kind):
     points = cloud(seed)
     at = points[seed % len(points)]
@@ -203,7 +203,7 @@ def test_any_points_give_a_ridge_or_a_value_error(seed, kind):
 
 
 @pytest.mark.parametrize("kind", ["ridge", "groove"])
-@pytest.mark.parametrize("first", [1200, 1240])
+@pytest.mark.parametrize("first", [1200])
 def test_a_groove_is_never_found_as_a_ridge_nor_a_ridge_as_a_groove(first, kind):
     wrong = []
     for seed in range(first, first + 40):

@@ -71,7 +71,7 @@ def test_two_ridges_by_mouse_and_keys(tmp_path: Path) -> None:
         for _ in range(12):
             page.keyboard.press("Shift+ArrowUp")
             page.keyboard.press("Enter")
-            page.wait_for_timeout(700)
+            page.wait_for_timeout(400)
             if page.locator(".ridge").count() == 2:
                 break
         assert page.locator(".ridge").count() == 2
@@ -90,7 +90,7 @@ def test_two_ridges_by_mouse_and_keys(tmp_path: Path) -> None:
 
 
 def test_a_march_is_stopped_in_the_middle(tmp_path: Path) -> None:
-    write_scan(tmp_path, 300_000, 4000.0)
+    write_scan(tmp_path, 200_000, 3000.0)
     with served(tmp_path, "clay.npy") as address, opened(address) as page:
         ready(page, "clay.npy")
         page.focus("#view")
