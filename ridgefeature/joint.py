@@ -201,7 +201,8 @@ def fit_whole(
         if shaping:
             new = _reshaped(task, state)
             shaping, state = new.section is not state.section or new.section is box(), new
-            if brief and not shaping and hardly_moved(task, known, state):
+            free = state.section.name == FREE  # its feet are still to be found
+            if brief and not shaping and not free and hardly_moved(task, known, state):
                 break
         if state.section.name == FREE and (n == rounds - 2 or not shaping):
             state = state.given(*between_feet(some, state.terms, state.section, state.noise, state.inflation))

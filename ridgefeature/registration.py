@@ -106,8 +106,7 @@ def _constructed(
     if settings.measure == "residual":
         found = fitted_over_ground(grid, stations, section, closed, open_ends(stop), settings, pick)
         found, track = followed(rough, full, found, track, settings, pick)
-        stop = track.stop
-        stations, intervals = found.stations, found.end_interval
+        stations, intervals, stop = found.stations, found.end_interval, track.stop
         section = section if found.joint is None else found.joint.section
         if found.closed:
             closed, stop = True, (CLOSED, CLOSED)

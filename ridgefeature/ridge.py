@@ -266,7 +266,7 @@ class Ridge(Stations):
             "width_max": float(self.width.max()),
             "half_height_width_min": float(self.half_height_width.min()),
             "half_height_width_max": float(self.half_height_width.max()),
-            "section": self.section.told_name,
+            "section": self.section.name,
             "closed": self.closed,
             "stop_start": self.stop[0],
             "stop_end": self.stop[1],

@@ -72,11 +72,6 @@ class Section:
         """Whether both of its flanks are alike to the last bit."""
         return bool((self.coefficients == self.coefficients[::-1]).all())
 
-    @property
-    def told_name(self) -> str:
-        """Its name for people: of all that were fitted to the points it is "learned"."""
-        return "learned" if self.name == "free" else self.name
-
     @cached_property
     def half_height_width(self) -> float:
         """Full width at half height as a part of the width between the feet."""

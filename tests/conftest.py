@@ -1,4 +1,7 @@
-"""Where several processes test, two compile half of the kernels each, instead of all of them everything."""
+"""Where several processes test, two compile half of the kernels each, instead of all of them everything.
+
+Tests that start Python do so with -P: what is imported then is what is installed, and compiled by then.
+"""
 
 from __future__ import annotations
 

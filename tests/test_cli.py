@@ -261,7 +261,19 @@ def test_an_interrupt_elsewhere_leaves_nothing_half_done(
 
 
 def test_the_module_runs_as_a_program(scan_file: Path, tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "ridgefeature", "register", str(scan_file), "--at", "1", "2", "--out", "x"]
+    words = [
+        sys.executable,
+        "-P",
+        "-m",
+        "ridgefeature",
+        "register",
+        str(scan_file),
+        "--at",
+        "1",
+        "2",
+        "--out",
+        "x",
+    ]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1 and "--at" in done.stderr
@@ -283,5 +295,5 @@ except SystemExit as end:
     slow = {{"cadquery", "matplotlib", "vtkmodules", "rich", "trimesh"}}
     print(end.code, sorted(slow & set(sys.modules)), "OCP" in sys.modules)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
     assert done.stdout.splitlines()[-1:] == ["0 [] True"], done.stderr

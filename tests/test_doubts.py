@@ -12,7 +12,7 @@ import ridgefeature as rf
 from ridgefeature.commands import output
 from ridgefeature.curvilinear import local_coordinates
 from ridgefeature.readable import rows
-from ridgefeature.section import Section, bell
+from ridgefeature.section import bell
 
 Array = NDArray[np.float64]
 PICK = (0.0, 0.0, 3.0)
@@ -68,12 +68,16 @@ def test_strays_that_are_as_many_everywhere_are_no_doubt(
     assert found.doubts == ()
 
 
+def picked_at(ridge: rf.Ridge, y: float, beyond: float) -> rf.Ridge:
+    """The ridge as if it had been picked beside its end."""
+    return replace(ridge, pick=ridge.spine[-1] + beyond * ridge.tangent[-1] + y * ridge.across[-1])
+
+
 @pytest.mark.parametrize(("y", "beyond"), [(10.5, -30.0), (-10.5, -30.0), (0.0, 3.5)])
 def test_a_pick_off_the_ridge_is_a_doubt_and_told(
     y: float, beyond: float, ridge: rf.Ridge, points: Array
 ) -> None:
-    at = ridge.spine[-1] + beyond * ridge.tangent[-1] + y * ridge.across[-1]
-    missed = replace(ridge, pick=at)
+    missed = picked_at(ridge, y, beyond)
     found = rf.diagnose(missed, points)
     ((low, high, why),) = found.doubts
     assert (low, high) == (0, ridge.length) and why.startswith("the pick lies ")
@@ -86,14 +90,7 @@ def test_a_pick_off_the_ridge_is_a_doubt_and_told(
 def test_a_pick_on_the_ridge_or_close_to_it_is_none(
     y: float, beyond: float, ridge: rf.Ridge, points: Array
 ) -> None:
-    at = ridge.spine[-1] + beyond * ridge.tangent[-1] + y * ridge.across[-1]
-    near = replace(ridge, pick=at)
+    near = picked_at(ridge, y, beyond)
     found = rf.diagnose(near, points)
     assert found.doubts == () and dict(rows(near, found))["in doubt"] == "no stretch"
-    assert dict(output.rows(near, found))["pick"] == " ".join(f"{x:.6g}" for x in at)
-
-
-def test_a_section_is_told_by_a_name_that_is_documented(ridge: rf.Ridge) -> None:
-    for name, told in (("free", "learned"), ("learned", "learned"), ("bell", "bell")):
-        named = replace(ridge, section=Section(ridge.section.coefficients, name))
-        assert dict(output.rows(named))["section"] == named.summary()["section"] == told
+    assert dict(output.rows(near, found))["pick"] == " ".join(f"{x:.6g}" for x in near.pick)

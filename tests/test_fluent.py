@@ -85,7 +85,7 @@ assert all(after[k] is v for k, v in before.items() if k != "__dict__")
 importlib.reload(cad_export)
 assert vars(cq.Workplane)["pasteRidge"] is after["pasteRidge"]
 """
-    subprocess.run([sys.executable, "-c", script], check=True)
+    subprocess.run([sys.executable, "-P", "-c", script], check=True)
 
 
 def test_a_reload_of_the_package_works(ridge):

@@ -65,7 +65,7 @@ def ridge(scan_file: Path) -> rf.Ridge:
 
 
 def program(hook: str, *words: object, folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", BEGIN + hook + END, *map(str, words)]
+    command = [sys.executable, "-P", "-c", BEGIN + hook + END, *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=300)
 
 
@@ -184,4 +184,4 @@ def test_with_the_import_of_the_module_interrupts_are_left_alone() -> None:
         "import ridgefeature.cli, ridgefeature.__main__;"
         "assert signal.getsignal(signal.SIGINT) is signal.default_int_handler"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    subprocess.run([sys.executable, "-P", "-c", code], check=True)

@@ -127,7 +127,7 @@ def test_heavy_libraries_are_imported_where_they_are_used():
 def test_importing_the_package_loads_neither_cad_nor_pictures():
     code = "import sys, ridgefeature; print(*sorted({m.partition('.')[0] for m in sys.modules}))"
     loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert "ridgefeature" in loaded
     assert not set(loaded) & {"OCP", "cadquery", "vtk", "vtkmodules", "matplotlib", "trimesh", "cad_export"}

@@ -212,5 +212,5 @@ print([m for m in {HEAVY} if m in sys.modules])
 ridgefeature.io.read_scan({str(tmp_path / "a.csv")!r})
 print([m for m in {HEAVY} if m in sys.modules])
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["[]", "[]"]

@@ -72,7 +72,7 @@ def test_ci_runs_the_test_command_word_for_word() -> None:
     assert pattern is not None
     found = next(line for line in TEXT.splitlines() if re.search(pattern[1], line))
     assert found == SET_UP[1]
-    assert script.rstrip().endswith('"$test_command"')
+    assert '\nbash -euo pipefail -c "$test_command"\n' in script
 
 
 def test_the_demo_ends_by_naming_files_that_are_there(shown: tuple[Path, str]) -> None:

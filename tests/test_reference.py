@@ -432,3 +432,13 @@ def test_a_ridge_is_found_whole_although(seed: int) -> None:
     ridge, seconds, _ = registered(case)
     assert ridge is not None
     assert score(case.truth, from_ridge(ridge, seconds)).failed == ()
+
+
+def test_a_section_that_is_learned_in_the_last_fit_ends_at_its_feet() -> None:
+    case = draw(100)
+    ridge, _, _ = registered(case)
+    assert ridge is not None and ridge.section.name == "learned"
+    true = case.truth.section.half_height_width
+    assert ridge.section.half_height_width == pytest.approx(true, rel=0.05)  # in widths between the feet
+    stations, inside = score(case.truth, from_ridge(ridge, 0)).bands[0]
+    assert inside >= 0.9 * stations

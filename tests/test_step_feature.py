@@ -357,7 +357,13 @@ print(loaded())
 cx.step(rf.load(sys.argv[2]), sys.argv[3])
 print(loaded())
 """
-    words = [sys.executable, "-c", code, *(str(tmp_path / n) for n in ("a.step", "a.ridge.json", "b.step"))]
+    words = [
+        sys.executable,
+        "-P",
+        "-c",
+        code,
+        *(str(tmp_path / n) for n in ("a.step", "a.ridge.json", "b.step")),
+    ]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == ["[]", "[]", "['OCP']"]
     same(cx.load(tmp_path / "b.step"), ridge)

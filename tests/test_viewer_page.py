@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,12 +18,13 @@ from page_ridges import HEIGHT, LENGTH, PICK, registered, scan
 
 pytest.importorskip("vtkmodules")
 
+import ridgefeature as rf
 from ridgefeature.viewer import curves, preview, saved
 from ridgefeature.viewer.marching import March
 from ridgefeature.viewer.page import TOLD, Page
 from ridgefeature.viewer.part_preview import PartPreview
 from ridgefeature.viewer.scene import Scene
-from ridgefeature.viewer.session import Session
+from ridgefeature.viewer.session import History, Session
 from ridgefeature.viewer.sizes import FIELDS
 from ridgefeature.viewer.work import Work
 
@@ -282,6 +286,33 @@ def test_points_are_coloured_by_deviation_of_the_registered_ridge(found: Page) -
     assert found.tell.legend == legend
     found.remove()
     assert found.tell.colouring == "height" and found.tell.legend == low
+
+
+def test_a_change_is_drawn_once(found: Page) -> None:
+    drawn: list[int] = []
+    found.draw = lambda: drawn.append(1)
+    for change in (
+        partial(found.colour, "deviation"),
+        found.undo,
+        found.redo,
+        partial(found.colour, "height"),
+    ):
+        drawn.clear()
+        change()
+        assert len(drawn) == 1, change
+
+
+def test_what_is_known_of_a_ridge_goes_with_it(found: Page) -> None:
+    found.history = History()
+    ridge = replace(registered())
+    found.found[ridge] = rf.diagnose(ridge, scan())
+    found.do(Session().added(ridge, PICK))
+    assert "coverage" in {row["name"] for row in found.tell.rows}
+    found.undo()
+    found.do(Session())
+    del ridge
+    gc.collect()
+    assert not found.found  # another ridge may get its place in memory
 
 
 def test_points_have_the_colours_of_their_file(work: Work, tmp_path: Path) -> None:

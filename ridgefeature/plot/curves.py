@@ -150,7 +150,7 @@ def _section(axes: Any, ridge: Ridge, points: Array) -> None:
     reach = min(float((ridge.border / ridge.width).max()), 1.2)
     y = np.linspace(-reach, reach, 401)
     axes.plot(y, ridge.section(y), color="black", lw=4)
-    axes.plot(y, ridge.section(y), color="#f59e0b", lw=2, label=f"section: {ridge.section.told_name}")
+    axes.plot(y, ridge.section(y), color="#f59e0b", lw=2, label=f"section: {ridge.section.name}")
     axes.axvspan(-0.5, 0.5, color=WIDTH, alpha=0.05, lw=0)
     axes.set(
         xlim=(-reach, reach),

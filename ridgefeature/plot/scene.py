@@ -129,39 +129,6 @@ def _aim(renderer: Any, camera: Camera) -> None:
     renderer.AddLight(light)
 
 
-def _polydata(points: Array) -> Any:
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-
-    data, places = vtkPolyData(), vtkPoints()
-    places.SetData(numpy_to_vtk(np.ascontiguousarray(points.reshape(-1, 3)), deep=True))
-    data.SetPoints(places)
-    return data
-
-
-def _cells(corners: NDArray[np.int64]) -> Any:
-    """Cells (m, k) of k corners each."""
-    from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonDataModel import vtkCellArray
-
-    count, per = corners.shape
-    cells = vtkCellArray()
-    ends = numpy_to_vtkIdTypeArray(np.arange(0, count * per + 1, per, dtype=np.int64), deep=True)
-    cells.SetData(ends, numpy_to_vtkIdTypeArray(np.ascontiguousarray(corners, np.int64).ravel(), deep=True))
-    return cells
-
-
-def _actor(renderer: Any, data: Any) -> Any:
-    from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
-
-    mapper, actor = vtkPolyDataMapper(), vtkActor()
-    mapper.SetInputData(data)
-    actor.SetMapper(mapper)
-    renderer.AddActor(actor)
-    return actor
-
-
 def surface_colours(scene: Scene) -> Array:
     """(nv, 3), 0 to 1: paler towards the crest, so that a ridge too low for shades is seen."""
     part = scene.rise[:, None]
@@ -176,12 +143,11 @@ def _dot(scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
 
 
 def _add_points(renderer: Any, scene: Scene, colours: Pixels, dot: float) -> None:
-    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from ridgefeature.plot.polydata import actor_in, paint, vertices
 
-    data = _polydata(scene.points)
-    data.SetVerts(_cells(np.arange(len(scene.points))[:, None]))
-    data.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(colours), deep=True))
-    look = _actor(renderer, data).GetProperty()
+    data = vertices(scene.points)
+    paint(data, colours)
+    look = actor_in(renderer, data).GetProperty()
     look.LightingOff()
     look.SetPointSize(OVERSAMPLING * dot)
 
@@ -189,15 +155,13 @@ def _add_points(renderer: Any, scene: Scene, colours: Pixels, dot: float) -> Non
 def _add_surface(renderer: Any, scene: Scene, shift: Array) -> None:
     from vtkmodules.util.numpy_support import numpy_to_vtk
 
-    nu, nv = scene.surface.shape[:2]
-    index = np.arange(nu * nv).reshape(nu, nv)
-    corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
-    data = _polydata(scene.surface + shift)
-    data.SetPolys(_cells(np.stack([c.ravel() for c in corners], axis=1)))
+    from ridgefeature.plot.polydata import actor_in, paint, quads
+
+    data = quads(scene.surface + shift)
     data.GetPointData().SetNormals(numpy_to_vtk(scene.normals.reshape(-1, 3).copy(), deep=True))
-    paint = np.broadcast_to(255 * surface_colours(scene), (nu, nv, 3)).reshape(-1, 3).astype(np.uint8)
-    data.GetPointData().SetScalars(numpy_to_vtk(paint, deep=True))
-    look = _actor(renderer, data).GetProperty()
+    colours = np.broadcast_to(255 * surface_colours(scene), scene.surface.shape)
+    paint(data, colours.reshape(-1, 3).astype(np.uint8))
+    look = actor_in(renderer, data).GetProperty()
     look.SetAmbient(0.38)
     look.SetDiffuse(0.72)
     look.SetSpecular(0.15)
@@ -205,9 +169,9 @@ def _add_surface(renderer: Any, scene: Scene, shift: Array) -> None:
 
 
 def _add_line(renderer: Any, points: Array, colour: str, width: float) -> None:
-    data = _polydata(points)
-    data.SetLines(_cells(np.arange(len(points))[None]))
-    look = _actor(renderer, data).GetProperty()
+    from ridgefeature.plot.polydata import actor_in, line
+
+    look = actor_in(renderer, line(points)).GetProperty()
     look.LightingOff()
     look.SetColor(*_rgb(colour))
     look.SetLineWidth(width)

@@ -11,6 +11,7 @@ import sys
 
 
 def main(path: str) -> None:
+    """Print what is wrong with the part in a .brep file."""
     import cadquery as cq
 
     from cad_export.certificate import check_shape

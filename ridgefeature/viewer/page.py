@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +49,8 @@ class Page:
         self.tell, self.scene, self.draw = tell, scene, draw
         self.scan: Scan | None = None
         self.history = History()
-        self.found: dict[int, Diagnosis] = {}
-        """By id of a registered ridge, what its scan tells of it."""
+        self.found: WeakKeyDictionary[Ridge, Diagnosis] = WeakKeyDictionary()
+        """What its scan tells of a ridge as registered, as long as there is a way back to it."""
         self.pointing = Pointing(tell, scene)
         self._shown: set[str] = set()
         self.sizes = Sizes(self)
@@ -177,13 +178,15 @@ class Page:
 
     def colour(self, by: str) -> None:
         """Points by "height", by "deviation" from the chosen ridge as registered, or as in the "file"."""
+        if len(self.scene.still):
+            self._paint(by)
+            self.refresh()
+
+    def _paint(self, by: str) -> None:
         feature, points = self.feature, self.scene.still
-        if not len(points):
-            return
         if by == "file" and self._own_colours is not None:
             self.scene.paint(self._own_colours)
             self.scene.faint, self.tell.colouring, self.tell.legend = False, "file", []
-            self.refresh()
             return
         deviation = by == "deviation" and feature is not None
         self._painted = feature.registered if feature is not None and deviation else None
@@ -197,7 +200,6 @@ class Page:
         self.tell.legend = [f"{number(x, 3)} {unit}" for x in (colouring.low, colouring.high)]
         self.tell.gradient = colouring.gradient
         self.tell.colouring = "deviation" if deviation else "height"
-        self.refresh()
 
     def theme(self) -> None:
         """Dark, or light."""
@@ -229,6 +231,9 @@ class Page:
     def refresh(self) -> None:
         """Show the session as it is: ridges, sliders, curves, table."""
         session, tell = self.session, self.tell
+        wanted = None if self.feature is None else self.feature.registered
+        if tell.colouring == "deviation" and self._painted is not wanted:
+            self._paint("deviation")
         names = {f.name for f in session.features if f.shown}
         for name in self._shown - names:
             self.scene.hide_ridge(name)
@@ -242,9 +247,6 @@ class Page:
         tell.chosen = session.chosen or ""
         tell.can_undo, tell.can_redo = bool(self.history.before), bool(self.history.after)
         self._tell_feature()
-        wanted = None if self.feature is None else self.feature.registered
-        if tell.colouring == "deviation" and self._painted is not wanted:
-            self.colour("deviation")
         self.draw()
         self.scale()
 
@@ -266,12 +268,12 @@ class Page:
         ridge, unit = feature.ridge, feature.ridge.unit
         spans = [(name, f"{number(float(x.min()))} to {number(float(x.max()))} {unit}")
                  for name, x in (("height h", ridge.height), ("width w", ridge.width))]  # fmt: skip
-        found = self.found.get(id(feature.registered))
+        found = self.found.get(feature.registered)
         return [
             ("kind", kind(ridge)),
             ("length", f"{number(ridge.length)} {unit}"),
             *spans,
-            ("section", ridge.section.told_name),
+            ("section", ridge.section.name),
             ("templates", templates(ridge)),
             *(ends(ridge) if found is None else trust(feature.registered, found)),
         ]

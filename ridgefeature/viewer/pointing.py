@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ class Pointing:
 
     def __init__(self, tell: Any, scene: Scene) -> None:
         self.tell, self.scene = tell, scene
-        self._near: dict[int, tuple[Array, Array, Array]] = {}
+        self._near: WeakKeyDictionary[Ridge, tuple[Array, Array, Array]] = WeakKeyDictionary()
 
     def clear(self) -> None:
         """Forget the scan."""
@@ -76,12 +77,12 @@ class Pointing:
 
     def points_near(self, ridge: Ridge) -> tuple[Array, Array, Array]:
         """Scan points beside a ridge, in its coordinates (s, y, z)."""
-        if id(ridge) not in self._near:
+        if ridge not in self._near:
             points = self.scene.still
             far = _MOST_FAR * float(ridge.border.max())
             low, high = ridge.spine.min(axis=0) - far, ridge.spine.max(axis=0) + far
             points = points[((points >= low) & (points <= high)).all(axis=1)]
             s, y, z = local_coordinates(ridge, points)
             near = np.abs(y) < far
-            self._near[id(ridge)] = s[near], y[near], z[near]
-        return self._near[id(ridge)]
+            self._near[ridge] = s[near], y[near], z[near]
+        return self._near[ridge]

@@ -8,14 +8,12 @@ import numpy as np
 import vtkmodules.vtkInteractionStyle
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (makes the renderer)
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import (
     vtkActor,
     vtkCamera,
     vtkCellPicker,
-    vtkPolyDataMapper,
     vtkRenderer,
     vtkRenderWindow,
     vtkRenderWindowInteractor,
@@ -23,11 +21,11 @@ from vtkmodules.vtkRenderingCore import (
 
 from ridgefeature.curvilinear import crest
 from ridgefeature.plot.marks import outline
+from ridgefeature.plot.polydata import actor_in, line, move, paint, quads, triangles, vertices
 from ridgefeature.ridge import Ridge
 from ridgefeature.template import Template
 from ridgefeature.viewer.colours import Pixels, plane_axes
 from ridgefeature.viewer.picking import picked, thinned
-from ridgefeature.viewer.polydata import line, move, quads, triangles, vertices
 
 Array = NDArray[np.float64]
 STILL, MOVING = 400_000, 40_000
@@ -90,8 +88,7 @@ class Scene:
         """Other colours (m, 3) for the points that are drawn."""
         for name, own in (("still", colours), ("moving", self._few(colours))):
             if name in self._actors:
-                data = self._actors[name].GetMapper().GetInput().GetPointData()
-                data.SetScalars(numpy_to_vtk(np.ascontiguousarray(own), deep=True))
+                paint(self._actors[name].GetMapper().GetInput(), own)
 
     def _few(self, rows: NDArray[Any]) -> NDArray[Any]:
         return rows[thinned(len(rows), MOVING)]
@@ -284,9 +281,5 @@ class Scene:
 
     def _show(self, name: str, data: vtkPolyData) -> vtkActor:
         self._drop(name)
-        mapper, actor = vtkPolyDataMapper(), vtkActor()
-        mapper.SetInputData(data)
-        actor.SetMapper(mapper)
-        self.renderer.AddActor(actor)
-        self._actors[name] = actor
-        return actor
+        self._actors[name] = actor_in(self.renderer, data)
+        return self._actors[name]

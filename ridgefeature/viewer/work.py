@@ -153,7 +153,7 @@ class Work:
         scan = self.page.scan
         if scan is not None:
             await aside(lambda: self.page.pointing.points_near(ridge))
-            self.page.found[id(ridge)] = await aside(lambda: diagnose(ridge, scan))
+            self.page.found[ridge] = await aside(lambda: diagnose(ridge, scan))
 
     def stop(self) -> None:
         """End the march at its next template."""
