@@ -1,4 +1,4 @@
-"""Points as a ridge sees them: arc length, distance from the spine, height over the base."""
+"""Points as a ridge sees them: arc length, distance from the spine, height over the spine or the base."""
 
 from __future__ import annotations
 
@@ -42,6 +42,11 @@ def local_coordinates(ridge: Ridge, points: Array) -> tuple[Array, Array, Array]
     )
     offset = points - origin
     return s, np.einsum("ij,ij->i", offset, across), np.einsum("ij,ij->i", offset, normal)
+
+
+def over_base(ridge: Ridge, s: Array, y: Array, z: Array) -> Array:
+    """Heights (n,) over the base, which is curved across the path, of what `local_coordinates` gives."""
+    return np.asarray(z - 0.5 * np.interp(s, ridge.arc_length, ridge.curvature) * y**2)
 
 
 def templates_on(ridge: Ridge) -> tuple[tuple[Template, ...], Array]:

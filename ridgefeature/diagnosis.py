@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.curvilinear import local_coordinates, templates_on, thinned
+from ridgefeature.curvilinear import local_coordinates, over_base, templates_on, thinned
 from ridgefeature.doubts import doubts, to_one_side
 from ridgefeature.folds import with_folds
 from ridgefeature.grid import build_grid, nearest_distances
@@ -150,7 +150,12 @@ def _footprint(ridge: Ridge, points: Array) -> tuple[Array, Array, Array, Array]
     s, y, z = local_coordinates(ridge, points)
     breadth, tall, width = (np.interp(s, ridge.arc_length, a) for a in (ridge.border, height, ridge.width))
     reach = _REACH[0] * tall + _REACH[1] * width
-    inside = (s >= 0) & (s <= ridge.length) & (np.abs(y) <= breadth) & (np.abs(z) <= tall + reach)
+    inside = (
+        (s >= 0)
+        & (s <= ridge.length)
+        & (np.abs(y) <= breadth)
+        & (np.abs(over_base(ridge, s, y, z)) <= tall + reach)
+    )
     surface = ridge.surface()
     (_, longest), (least, most) = surface.domain
     # From where the point is in the stations' frames: a search for the nearest sample takes ten times longer.

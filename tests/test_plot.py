@@ -17,7 +17,7 @@ from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.plot import camera, scene
 from ridgefeature.plot.marks import outline
 from ridgefeature.readable import number
-from ridgefeature.section import plateau
+from ridgefeature.section import bell, plateau
 from ridgefeature.synthetic import Spiral
 
 SPIRAL = Spiral()
@@ -159,6 +159,18 @@ def test_local_coordinates_between_stations(ridge: rf.Ridge) -> None:
     assert np.ptp(found - s) < 0.5
     np.testing.assert_allclose(y, 1, atol=0.15)
     np.testing.assert_allclose(z, 2, atol=0.15)
+
+
+def test_heights_on_a_pipe_are_over_the_pipe(tmp_path: Path) -> None:
+    radius, x = 25.0, np.random.default_rng(1)
+    s, across = x.uniform(-50, 50, 20_000), x.uniform(-15, 15, 20_000)
+    out = radius + 3 * bell()(across / 10) + x.normal(0, 0.05, 20_000)
+    points = np.column_stack([s, out * np.sin(across / radius), out * np.cos(across / radius) - radius])
+    ridge = rf.register(points, at=(0, 0, 3))
+    dots = plot.profile(ridge, tmp_path / "p.png", points).axes[-1].lines[0]
+    eta, zeta = np.asarray(dots.get_data())
+    assert np.abs(zeta - bell()(eta)).max() < 0.15  # the noise is 0.017, up to the borders
+    assert np.abs(eta).max() > 0.9
 
 
 def test_outline_lies_on_its_template(ridge: rf.Ridge) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ridgefeature.curvilinear import local_coordinates, templates_on, thinned
+from ridgefeature.curvilinear import local_coordinates, over_base, templates_on, thinned
 from ridgefeature.plot.files import new_figure, save
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import Scan, as_scan
@@ -134,7 +134,7 @@ def _section(axes: Any, ridge: Ridge, points: Array) -> None:
         np.interp(s, ridge.arc_length, a) for a in (ridge.width, ridge.height, ridge.border)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        eta, zeta = y / width, z / height
+        eta, zeta = y / width, over_base(ridge, s, y, z) / height
     on = (s >= 0) & (s <= ridge.length) & (np.abs(y) <= border) & (np.abs(zeta) < 3)
     seen = thinned(np.column_stack([eta[on], zeta[on]]), _MOST)
     axes.plot(

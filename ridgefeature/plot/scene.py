@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvilinear import crest, local_coordinates, templates_on, thinned
+from ridgefeature.curvilinear import crest, local_coordinates, over_base, templates_on, thinned
 from ridgefeature.plot.camera import Camera
 from ridgefeature.plot.marks import outline
 from ridgefeature.ridge import Ridge
@@ -53,7 +53,7 @@ def build(ridge: Ridge, points: Array) -> Scene:
     on_ridge = (s >= 0) & (s <= ridge.length) & (np.abs(y) <= np.interp(s, ridge.arc_length, ridge.border))
     return Scene(
         near,
-        z,
+        over_base(ridge, s, y, z),
         on_ridge,
         grid,
         normals,
