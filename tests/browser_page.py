@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
@@ -29,12 +28,8 @@ def served(folder: Path, *words: str) -> Iterator[str]:
     """The page's address; `words` are what the command is asked besides."""
     log = folder / "view.log"
     command = [sys.executable, "-u", "-m", "ridgefeature", "view", "--no-browser", *words]
-    root = str(Path(__file__).parent.parent)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     with log.open("w") as file:
-        process = subprocess.Popen(
-            command, cwd=folder, stdout=file, stderr=subprocess.STDOUT, env=environment
-        )
+        process = subprocess.Popen(command, cwd=folder, stdout=file, stderr=subprocess.STDOUT)
     try:
         for _ in range(600):
             found = re.search(r"http://\S+", log.read_text())
@@ -49,7 +44,10 @@ def served(folder: Path, *words: str) -> Iterator[str]:
         assert process.poll() is None, f"the server ended: {log.read_text()}"
     finally:
         process.terminate()
-        process.wait(10)
+        try:
+            process.wait(10)
+        finally:
+            process.kill()
 
 
 @contextmanager

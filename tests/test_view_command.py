@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -18,9 +17,8 @@ from cli_helpers import fails, run
 def test_it_serves_until_it_is_interrupted(tmp_path: Path) -> None:
     write_scan(tmp_path)
     command = [sys.executable, "-u", "-m", "ridgefeature", "view", "clay.npy", "--no-browser"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent)}
     process = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     assert process.stdout is not None
     first = process.stdout.readline()
