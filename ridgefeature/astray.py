@@ -7,6 +7,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.medians import median
 from ridgefeature.stations import Stations
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ def core_of(stations: Stations) -> Stations | None:
     Without a width at either end, which what follows may have bent. None where that is too short, or the
     march did not go astray.
     """
-    sizes = np.abs([np.log(np.maximum(v / np.median(v), 1e-9)) for v in (stations.height, stations.width)])
+    sizes = np.abs([np.log(np.maximum(v / median(v), 1e-9)) for v in (stations.height, stations.width)])
     alike = (sizes < np.log(_ALIKE)).all(axis=0)
     return None if (sizes < np.log(_ASTRAY)).all() else longest_part(stations, alike)
 
@@ -38,7 +39,7 @@ def longest_part(stations: Stations, good: Flags) -> Stations | None:
     """The longest stretch of good stations (k,), without a width where others follow; None if it is short."""
     if not good.any():
         return None
-    s, usual = stations.arc_length, float(np.median(stations.width))
+    s, usual = stations.arc_length, median(stations.width)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]]))).reshape(-1, 2)
     first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
     low, high = s[first] + usual * (first > 0), s[last - 1] - usual * (last < len(s))
@@ -51,7 +52,7 @@ def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Statio
 
     Another rise under it has so many points that the section would be its own.
     """
-    s, usual = stations.arc_length, float(np.median(stations.width))
+    s, usual = stations.arc_length, median(stations.width)
     first, last = usual_ends(s, stations.width, open_ends)
     if last - first == len(s) - 1 or s[last] - s[first] < SHORTEST * usual or last - first + 1 < _FEWEST:
         return stations
@@ -61,7 +62,7 @@ def as_wide_as_usual(stations: Stations, open_ends: tuple[bool, bool]) -> Statio
 def usual_ends(at: Array, width: Array, open_ends: tuple[bool, bool]) -> tuple[int, int]:
     """The first and the last place of a ridge that is about as wide as it usually is; of an end that is not
     open the very end. at (n,): arc lengths of the places, of which there may be more where it is narrow."""
-    usual = float(np.median(np.interp(np.linspace(at[0], at[-1], len(at)), at, width)))
+    usual = median(np.interp(np.linspace(at[0], at[-1], len(at)), at, width))
     alike = np.flatnonzero((width <= OTHER_WIDTH * usual) & (OTHER_WIDTH * width >= usual))
     if not len(alike):
         return 0, len(width) - 1

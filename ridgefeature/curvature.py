@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from statistics import NormalDist
 
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ridgefeature.improve import floor, improve, loss_of
 from ridgefeature.kernels import chain
 from ridgefeature.kernels.base import flattened, seen_from, standing, turning
-from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, solved
+from ridgefeature.kernels.base_terms import FREE, found_terms, smoothed, softened, summed
+from ridgefeature.medians import median
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
 from ridgefeature.window import Window
@@ -46,18 +47,21 @@ class Found:
     information: Array
     points: Array
 
+    @cached_property
+    def _summed(self) -> tuple[Array, float, float, int]:
+        known = _SURE_OF_SCALE * np.maximum(self.points - FREE, 1.0)
+        return summed(self.terms, self.information, known)
+
     @property
     def mean(self) -> Array:
         """(3,) weighted by information; zeros where that is not enough."""
-        whole = self.information.sum(axis=0)
-        pull = np.einsum("nij,nj->i", self.information, self.terms)
-        return solved(whole, pull)
+        return self._summed[0]
 
     def seen_from(self, axes: Array) -> Found:
         """The same in a frame whose axes (3, 3), columns, are given in its own."""
         yaw = float(np.arctan2(axes[1, 0], axes[0, 0]))
         there, back = turning(yaw), turning(-yaw)
-        return replace(self, terms=self.terms @ there.T, information=back.T @ self.information @ back)
+        return Found(self.terms @ there.T, back.T @ self.information @ back, self.points)
 
     def significant(self, chance: float) -> bool:
         """Whether the terms differ from zero by more than chance: their mean, or all together.
@@ -67,15 +71,9 @@ class Found:
         """
         if chance >= 0.5:
             return False
-        known = _SURE_OF_SCALE * np.maximum(self.points - FREE, 1.0)
-        mean = self.mean
-        of_mean = float(mean @ self.information.sum(axis=0) @ mean)
-        each = np.einsum("ni,nij,nj->n", self.terms, self.information, self.terms)
-        total, whole = float((known * np.log1p(each / known)).sum()), float(known.sum())
-        told = int((each > 0).sum())
+        _, of_mean, of_all, told = self._summed
         return told > 0 and (
-            whole * np.log1p(of_mean / whole) > _chi_square(3, 0.5 * chance)
-            or total > _chi_square(3 * told, 0.5 * chance)
+            of_mean > _chi_square(3, 0.5 * chance) or of_all > _chi_square(3 * told, 0.5 * chance)
         )
 
 
@@ -98,9 +96,8 @@ def joined(found: list[Found]) -> Found:
 
 def _roughly(found: Found, width: float) -> Found:
     """The same, less sure: a template alone knows no bend of its path and no slopes of height and width."""
-    return replace(
-        found, information=np.array([softened(i, (_UNTOLD / width) ** 2) for i in found.information])
-    )
+    softer = [softened(i, (_UNTOLD / width) ** 2) for i in found.information]
+    return Found(found.terms, np.array(softer), found.points)
 
 
 def improve_on_base(window: Window, start: Template, settings: Settings) -> Template | None:
@@ -133,11 +130,9 @@ class Ahead:
             return template
         new = _roughly(terms_of(window(template), template, self.settings), template.width)
         turned = self.found.seen_from(self.axes.T @ template.rotation)
-        old = replace(turned, information=_KEPT * turned.information, points=_KEPT * turned.points)
+        old = Found(turned.terms, _KEPT * turned.information, _KEPT * turned.points)
         self.axes = template.rotation
-        both = Found(
-            *(np.concatenate(pair) for pair in zip(vars(old).values(), vars(new).values(), strict=True))
-        )
+        both = joined([old, new])
         self.found = Found(
             both.mean[None],
             both.information.sum(axis=0, keepdims=True),
@@ -179,7 +174,7 @@ def curved(templates: tuple[Template, ...], found: Found) -> tuple[Template, ...
     yaws = np.concatenate([[0.0], np.cumsum([np.arctan2(way[1, 0], way[0, 0]) for way in ways])])
     steps = np.linalg.norm(np.diff([t.position for t in templates], axis=0), axis=1)
     at = np.concatenate([[0.0], np.cumsum(steps)])
-    width = float(np.median([t.width for t in templates]))
+    width = median([t.width for t in templates])
     tried = [_smoothed(at, found, turn, width) for turn in (yaws, 0.0 * yaws)]
     smooth, std, _ = max(tried, key=lambda fit: fit[2])
     return tuple(t.changed(base=c, base_std=d) for t, c, d in zip(templates, smooth, std, strict=True))

@@ -138,6 +138,8 @@ def place_ends(window: Window, track: Track, settings: Settings) -> Track:
     if not track.stop[1].startswith(GOES_ON):
         templates = _trim_end(window, templates, settings)
     if not track.stop[0].startswith(GOES_ON):
-        backwards = _trim_end(window, [reverse(t) for t in reversed(templates)], settings)
-        templates = [reverse(t) for t in reversed(backwards)]
+        turned = [reverse(t) for t in reversed(templates)]
+        forth = dict(zip(map(id, turned), reversed(templates), strict=True))
+        backwards = _trim_end(window, turned, settings)
+        templates = [forth.get(id(t)) or reverse(t) for t in reversed(backwards)]
     return replace(track, templates=tuple(templates))

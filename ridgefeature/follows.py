@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.continuation import FLAT
 from ridgefeature.grid import Grid, points_in_box
+from ridgefeature.medians import median
 from ridgefeature.stations import Stations
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ def told_ends(grid: Grid, stations: Stations, stop: tuple[str, str]) -> tuple[st
 
 def what_follows(grid: Grid, stations: Stations, end: int) -> str:
     """ABOVE or BELOW, if points beyond the start (end = 0) or the end (1) are so; else empty."""
-    height, width = float(np.median(np.abs(stations.height))), float(np.median(stations.width))
+    height, width = median(np.abs(stations.height)), median(stations.width)
     last, outwards = (0, -1.0) if end == 0 else (-1, 1.0)
     near, bend = _base(stations, last, width)
     frame = _frame(stations, near)

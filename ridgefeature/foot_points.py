@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.kernels.strip import TERMS, A, B, C, E, H, W
+from ridgefeature.medians import median
 from ridgefeature.section import Section
 
 Array = NDArray[np.float64]
@@ -30,7 +31,7 @@ def distances(points: Array, terms: Array, section: Section) -> tuple[Array, Arr
     e, h, w = there[:, E], there[:, H], there[:, W]
     y = points[:, 1]
     aside, over = y - e, points[:, 2] - there[:, A] - y * (there[:, B] + there[:, C] * y)
-    eta = _places(section, float(np.median(np.abs(h)) / np.median(w)))
+    eta = _places(section, float(median(np.abs(h)) / median(w)))
     f = section(eta)
     far = (aside[:, None] - w[:, None] * eta) ** 2 + (over[:, None] - h[:, None] * f) ** 2
     foot = eta[np.argmin(far, axis=1)]

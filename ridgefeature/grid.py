@@ -13,6 +13,8 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from ridgefeature.medians import median
+
 from .kernels import grid as kernels
 from .kernels import nearest as nearest_kernels
 from .kernels import window
@@ -144,7 +146,7 @@ def typical_spacing(grid: Grid, probes: int = 256) -> float:
         apart = apart[apart < np.inf]
         if 2 * len(apart) >= m:
             break
-    return float(np.median(apart)) if len(apart) else 0.0
+    return median(apart) if len(apart) else 0.0
 
 
 def as_points(points: npt.ArrayLike) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ridgefeature.astray import usual_ends
 from ridgefeature.joint import Joint, least_noise
 from ridgefeature.kernels.strip import H, W
+from ridgefeature.medians import median
 from ridgefeature.path_frame import NODES_A_WIDTH
 
 Array = NDArray[np.float64]
@@ -108,7 +109,7 @@ def _below_a_wall(sizes: Array, first: int, end: int) -> int:
     highest = np.maximum.accumulate(height)
     walls = (1.0 + _WALL[0]) * highest < highest[end]  # where there may be one further on
     for k in range(max(first, NODES_A_WIDTH), min(int(walls.sum()), end - 1)):
-        usual = float(np.median(height[k - NODES_A_WIDTH : k + 1]))
+        usual = median(height[k - NODES_A_WIDTH : k + 1])
         if height[k - NODES_A_WIDTH : k + 1].min() < _LEVEL * height[k]:
             continue  # it rises evenly, as from an end that fades
         ahead = height[k : min(k + NODES_A_WIDTH, end) + 1]
@@ -125,7 +126,7 @@ def _noise(joint: Joint, start: int, end: int) -> Array:
     sums = windows(joint.misfit, half)
     noise = sums[:, 1] / np.maximum(sums[:, 0], 1.0)
     least = (least_noise(joint.terms) / max(least_noise(joint.terms), joint.noise.scale)) ** 2
-    usual = float(np.median(noise[start : max(end - half, start) + 1]))
+    usual = median(noise[start : max(end - half, start) + 1])
     return np.asarray(noise / max(usual, least, 1e-300))
 
 
@@ -140,7 +141,7 @@ def _on_top(top: Array, end: int) -> int:
 
     Without them a spline goes on as flanks alone pull it.
     """
-    usual = max(float(np.median(top)), 1e-3)
+    usual = max(median(top), 1e-3)
     few = math.ceil(_EXPECTED / usual)
     least = len(top) // 2
     while end > least and top[max(end - few, 0) : end].sum() <= _FEWEST * few * usual:

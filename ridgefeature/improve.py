@@ -164,8 +164,9 @@ def _moved(template: Template, transform: Array, q: Array) -> Template:
 
 def _standing(template: Template, position: Array, rotation: Array, height: float, width: float) -> Template:
     """The template after a fit, which saw its base as flat: on a curved one the frame goes along with it."""
-    base, old, turn = template.base, template.rotation, template.rotation.T @ rotation
-    if base.any():
+    base = template.base
+    if template.curved:
+        old, turn = template.rotation, template.rotation.T @ rotation
         place, axes = standing(old.T @ (position - template.position), turn, base)
         position, rotation, base = template.position + old @ place, old @ axes, seen_from(base, turn)
     return template.changed(position=position, rotation=rotation, height=height, width=width, base=base)

@@ -14,6 +14,7 @@ from ridgefeature.grid import Grid
 from ridgefeature.joint_rounds import Fit, State, Task, chance, hardly_moved, improved, is_steep, task_of
 from ridgefeature.kernels.section_sums import misfit_sums
 from ridgefeature.kernels.strip import TERMS, C, E, H, W
+from ridgefeature.medians import median
 from ridgefeature.missed_points import with_missed_points
 from ridgefeature.noise import Noise, evenness, first_noise
 from ridgefeature.path_frame import PathFrame, points_along
@@ -292,4 +293,4 @@ def _girths(section: Section, terms: Array) -> Array:
 
 def least_noise(terms: Array) -> float:
     """Distance of points that the section of a ridge with these terms (n, 6) may always miss by."""
-    return _LEAST_NOISE * float(np.median(np.abs(terms[:, H])))
+    return _LEAST_NOISE * median(np.abs(terms[:, H]))

@@ -12,6 +12,7 @@ from ridgefeature.foot_points import distances
 from ridgefeature.foot_points import information as foot_information
 from ridgefeature.kernels.information import information
 from ridgefeature.kernels.strip import A, C, E, H, W, mixture, offsets
+from ridgefeature.medians import median
 from ridgefeature.noise import EXACT, Noise, blur_of, inflation_along, inflation_of
 from ridgefeature.path_frame import PathFrame
 from ridgefeature.scan_lines import scan_lines
@@ -135,7 +136,7 @@ def improved(
     goal += np.einsum("nij,nj->ni", matrix, 0.5 * (state.terms[1:] + state.terms[:-1]))
     if shared:
         local = _common_errors(points, path, state, noise, len(task.some))
-        known, inflation = gain / np.maximum(inflation, local), max(inflation, float(np.median(local)))
+        known, inflation = gain / np.maximum(inflation, local), max(inflation, median(local))
         matrix, goal = known[:, None, None] * matrix, known[:, None] * goal
     else:
         matrix, goal = gain / inflation * matrix, gain / inflation * goal

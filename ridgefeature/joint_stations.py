@@ -11,6 +11,7 @@ from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.joint import Joint
 from ridgefeature.kernels.strip import E, H, W
+from ridgefeature.medians import median
 from ridgefeature.settings import Settings
 from ridgefeature.smoothing import basis_at
 from ridgefeature.stations import Stations, arc_lengths, border_of, interpolating_curve, meeting, unit
@@ -54,8 +55,8 @@ def stations_of(
     normal = unit(normal - tangent * (normal * tangent).sum(axis=1, keepdims=True))
     bend = np.abs((np.gradient(tangent, even, axis=0) * np.cross(normal, tangent)).sum(axis=1))
     curvature, height, width = values.T
-    width = np.maximum(width, _NARROWEST * np.median(joint.terms[:, W]))  # those are never negative
-    usual = float(np.median(height))
+    width = np.maximum(width, _NARROWEST * median(joint.terms[:, W]))  # those are never negative
+    usual = median(height)
     height = np.copysign(np.maximum(height * np.sign(usual), _LOWEST * abs(usual)), usual)
     half = joint.section.half_height_width
     found = Stations(

@@ -12,6 +12,7 @@ from ridgefeature.kernels import appraise
 from ridgefeature.kernels.appraise import residuals
 from ridgefeature.kernels.base import flattened, on_base
 from ridgefeature.march import Track
+from ridgefeature.medians import median
 from ridgefeature.section import REACH, SECTIONS, Section, bell, plateau, uniform_basis
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, misfit_scale, settle, settle_base
@@ -60,7 +61,7 @@ def march_section(window: Window, first: Template, settings: Settings) -> Templa
     for template in (first, steep):
         seen = _seen_from(template, points, first)
         losses.append(len(seen) * appraise.mean_loss(seen, *template.shape, scale, *loss_of(settings))[0])
-        forth = np.median(np.abs(residuals(seen, *template.shape)))
+        forth = median(np.abs(residuals(seen, *template.shape)))
         apart.append(float(forth) + window.mean_distance(sample(template), 1))
     if losses[1] > losses[0] - _DOUBT and apart[1] > _CLEARLY * apart[0]:
         return first
@@ -77,7 +78,7 @@ def in_doubt(misfit: Array, templates: tuple[Template, ...]) -> bool:
     if not any(t.height for t in templates):
         return False
     square = float((total**2 / np.maximum(count, 1.0)).sum())
-    noise = float(np.median([misfit_scale(t) / abs(t.height) for t in templates if t.height]))
+    noise = median([misfit_scale(t) / abs(t.height) for t in templates if t.height])
     shift = float(np.abs(total / np.maximum(count, 30.0)).max()) * noise
     return square > len(count) + 6.0 * np.sqrt(2.0 * len(count)) and shift > _SMALLEST_SHIFT
 

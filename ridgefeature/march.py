@@ -55,6 +55,9 @@ _EDGE = 10.0
 _FITS_NOT = 0.35
 """Noise, in heights, above which such a fit is none."""
 
+_TURNED = np.array([-1.0, -1.0, 1.0])
+"""Signs of the axes for someone who walks the other way."""
+
 
 @dataclass(frozen=True, eq=False)
 class Track:
@@ -73,7 +76,7 @@ class Track:
 def reverse(template: Template) -> Template:
     """The same patch, seen by someone who walks the other way."""
     return template.changed(
-        rotation=template.rotation * np.array([-1.0, -1.0, 1.0]),
+        rotation=template.rotation * _TURNED,
         trend=-template.trend,
     )
 

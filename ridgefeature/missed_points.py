@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels.agreement import agreed_heights
 from ridgefeature.kernels.strip import A, B, H, W, places_across
+from ridgefeature.medians import median
 from ridgefeature.noise import Noise
 from ridgefeature.path_frame import NODES_A_WIDTH
 from ridgefeature.section import Section
@@ -38,8 +39,8 @@ def with_missed_points(points: Array, terms: Array, section: Section, noise: Noi
     known = terms[:, H] != 0
     if not known.any():
         return terms
-    sizes, sign = np.abs(terms[known, H]), np.sign(np.median(terms[known, H]))
-    usual, largest = float(np.median(sizes)), float(sizes.max())
+    sizes, sign = np.abs(terms[known, H]), np.sign(median(terms[known, H]))
+    usual, largest = median(sizes), float(sizes.max())
     eta = places_across(points, terms)
     off, near = _OFF * noise.scale, max(_OFF * noise.scale, _LEAST * usual)
     out = terms.copy()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.kernels.section_sums import strip_sums
 from ridgefeature.kernels.strip import TERMS, H, W, mixture, offsets, places_across
+from ridgefeature.medians import median
 from ridgefeature.path_frame import NODES_A_WIDTH
 from ridgefeature.section import Section
 from ridgefeature.smearing import smear
@@ -75,7 +76,7 @@ def first_noise(
     points = np.ascontiguousarray(points[:: 1 + len(points) // _ENOUGH])
     seen = smear(section, terms, 0.0, 0.0).told
     distances, far = offsets(points, terms, seen, EXACT * h)
-    scale = max(1.4826 * float(np.median(np.abs(distances))), EXACT * h)
+    scale = max(1.4826 * median(np.abs(distances)), EXACT * h)
     span = 4.0 * h + 0.5 * w  # as in PathFrame.tall
     scale, strays, density = mixture(distances, far, scale, _SOME_STRAYS, span, EXACT * h, _FIRST_MIXTURE)
     blur = blur_of(points, terms, distances, scale, span, EXACT * h)
@@ -106,7 +107,7 @@ def evenness(points: Array, terms: Array, section: Section, noise: Noise) -> flo
 
 def _evenness(points: Array, terms: Array, section: Section, noise: float) -> float:
     """The same of points among which there are no strays."""
-    h, w = float(np.median(np.abs(terms[:, H]))), float(np.median(terms[:, W]))
+    h, w = median(np.abs(terms[:, H])), median(terms[:, W])
 
     def stretched(eta: Array) -> Array:
         return np.asarray(np.sqrt(1.0 + (h / w * section(eta, 1)) ** 2))
@@ -170,4 +171,4 @@ def inflation_of(matrix: Array, right: Array) -> float:
     seen = np.einsum("nij,ni->nj", vectors, pull[good] / sizes[good]) ** 2
     told = values > 1e-6
     each = np.where(told, seen / np.maximum(values, 1e-6), 0.0).sum(axis=1) / told.sum(axis=1)
-    return max(1.0, float(np.median(each)) / _MEDIAN)
+    return max(1.0, median(each) / _MEDIAN)

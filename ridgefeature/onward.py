@@ -19,6 +19,7 @@ from ridgefeature.improve import improve, judge
 from ridgefeature.joint import Joint, least_noise
 from ridgefeature.kernels.algebra import facing
 from ridgefeature.march import CAME_HOME, GOES_ON, INTERRUPTED, Track, march_one_way, reverse
+from ridgefeature.medians import median
 from ridgefeature.refit import Refit
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -88,7 +89,7 @@ def _better(again: Refit, before: Refit) -> bool:
     """
     if again.joint is None or before.joint is None:
         return False
-    known, width = before.stations, float(np.median(before.stations.width))
+    known, width = before.stations, median(before.stations.width)
     growth = again.stations.arc_length[-1] - known.arc_length[-1]
     apart = np.linalg.norm(again.joint.path.origin[:, None] - known.spine, axis=2).min(axis=1)
     added = np.minimum(apart[1:], apart[:-1]) > _ADDED * width
@@ -102,7 +103,7 @@ def _square(joint: Joint, stretches: NDArray[np.bool_] | slice) -> float:
     little too far out."""
     count, squares = joint.misfit[stretches, :2].T
     seen = count > 0
-    usual = float(np.median(squares[seen] / count[seen])) if seen.any() else 0.0
+    usual = median(squares[seen] / count[seen]) if seen.any() else 0.0
     return usual * max(joint.noise.scale, least_noise(joint.terms)) ** 2
 
 
@@ -195,8 +196,8 @@ def _goes_on(window: Window, stations: Stations, last: int, section: Section, se
     """
     s, w = stations.arc_length, float(stations.width[last])
     near = np.abs(s - s[last]) < _FAR * w
-    height = float(np.median(stations.height[near]))
-    if abs(height) < _FADED * abs(float(np.median(stations.height))):
+    height = median(stations.height[near])
+    if abs(height) < _FADED * abs(median(stations.height)):
         return False
     end = _template(stations, float(s[last]), section, settings)
     points = window(end.changed(height=height, length=2.0 * _FAR * w, flank=(_FAR - 0.5) * w))

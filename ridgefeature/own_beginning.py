@@ -7,6 +7,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.medians import median
 from ridgefeature.stations import Stations, meeting
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ def as_ring(stations: Stations) -> Stations | None:
     What lies before and beyond is left out: it is the same ridge again. Ends may be bent, so a place further
     in is tried too.
     """
-    s, usual = stations.arc_length, float(np.median(stations.width))
+    s, usual = stations.arc_length, median(stations.width)
     for inwards in _BEGIN:
         first = int(np.searchsorted(s, inwards * usual))
         last = _passed_again(stations, first, usual) if first < len(s) else None

@@ -12,6 +12,7 @@ from ridgefeature.grid import Grid
 from ridgefeature.kernels.algebra import rotation_of
 from ridgefeature.kernels.path_points import boxes_around, count_along, rectified_along
 from ridgefeature.kernels.strip import TERMS, A, B, C, E
+from ridgefeature.medians import median
 from ridgefeature.merge import along
 from ridgefeature.smoothing import basis_at
 from ridgefeature.stations import Stations, unit
@@ -57,8 +58,8 @@ class PathFrame:
     @cached_property
     def sizes(self) -> tuple[float, float]:
         """The usual height, as far as any is known, and width."""
-        known, width = np.abs(self.height[self.height != 0]), float(np.median(self.width))
-        return float(np.median(known)) if len(known) else width, width
+        known, width = np.abs(self.height[self.height != 0]), median(self.width)
+        return median(known) if len(known) else width, width
 
     @cached_property
     def at_nodes(self) -> tuple[NDArray[np.intp], Array]:

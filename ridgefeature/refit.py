@@ -14,6 +14,7 @@ from ridgefeature.joint import FOUND, MOST_POINTS, SOME_POINTS, Joint, fit_whole
 from ridgefeature.joint_rounds import is_steep
 from ridgefeature.joint_stations import stations_of, with_section_std
 from ridgefeature.kernels.strip import A, C, E, H, W
+from ridgefeature.medians import median
 from ridgefeature.own_beginning import as_ring
 from ridgefeature.path_frame import PathFrame, path_frame
 from ridgefeature.section import Section
@@ -141,7 +142,7 @@ def _held(
             break
         start, end = held(joint, open_ends, _place(joint.path, pick))
         length = end - start
-        if length >= known[-1] or length < SHORTEST * float(np.median(joint.terms[:, W])):
+        if length >= known[-1] or length < SHORTEST * median(joint.terms[:, W]):
             break
         count = max(round(length / known[1]) + 1, 13)
         laid = stations_of(joint, count, settings, (start, end), known=True)
@@ -173,7 +174,7 @@ def _grown(
     """
     for _ in range(_GROWTHS):
         laid, intervals, moved = _between_ends(grid, laid, joint, open_ends, settings, flat, pick)
-        if max(moved) < _MUCH * float(np.median(laid.width)) or as_ring(laid):
+        if max(moved) < _MUCH * median(laid.width) or as_ring(laid):
             break
         again = _fit(grid, path_frame(laid, False), joint.section, settings, joint, flat)
         if again is None:
@@ -254,7 +255,7 @@ def _between_ends(
     if wide is None or not np.isfinite(wide.terms).all():
         return stations, None, (0.0, 0.0)
     start, end = ends_of(wide, joint, 0.0, length, open_ends, settings.look_ahead, _place(path, pick))
-    if end - start < SHORTEST * float(np.median(stations.width)):
+    if end - start < SHORTEST * median(stations.width):
         return stations, None, (0.0, 0.0)
     intervals = np.array([end_interval(wide, start, -1), end_interval(wide, end, 1)]) - start
     intervals[~np.array(open_ends)] = np.nan

@@ -18,6 +18,7 @@ from ridgefeature.guess import guess
 from ridgefeature.improve import sample
 from ridgefeature.learn import choose_section, first_section, in_doubt, march_section, resettled
 from ridgefeature.march import Progress, Track, march, reverse
+from ridgefeature.medians import median
 from ridgefeature.onward import followed, open_ends
 from ridgefeature.ridge import Ridge
 from ridgefeature.rings import CLOSED, ring_or_not
@@ -113,7 +114,7 @@ def _constructed(
         why = (
             unsound(found.sound, track)
             or unknown_height(stations)
-            or fin(stations.height, float(np.median(stations.width)), settings)
+            or fin(stations.height, median(stations.width), settings)
         )
         if why:
             raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", track.templates[0].width)
@@ -220,7 +221,7 @@ def _track(
 def _on_base(rough: Window, full: Window, track: Track, settings: Settings) -> Track:
     """The settled track on its curved base, if it has one and steep flanks are not explained away by it."""
     bent = settle_base(full, track, settings)
-    usual = float(np.median([abs(t.height) / t.width for t in track.templates]))
+    usual = median([abs(t.height) / t.width for t in track.templates])
     if usual < STEEP or not any(t.curved for t in bent.templates):
         return bent
     before, now = (sum(distinct(rough, t, settings) for t in x.templates) for x in (track, bent))
@@ -279,7 +280,7 @@ def _spacing(grid: Grid, pick: Array) -> float:
     """
     near = nearest(grid, pick[None], min(_NEAR, len(grid.points)))[1][0]
     apart = nearest_distances(grid, near, 2)[:, 1]
-    spacing = float(np.median(apart[apart > 0])) if (apart > 0).any() else typical_spacing(grid)
+    spacing = median(apart[apart > 0]) if (apart > 0).any() else typical_spacing(grid)
     if not spacing > 0:
         raise ValueError(
             "scan: expected points that lie apart, got most of them repeated; drop the repeated ones"

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ridgefeature.base import Base, RuledBase, registered_base
 from ridgefeature.bspline import Surface
 from ridgefeature.fitting import check_widths, stretched
+from ridgefeature.medians import median
 from ridgefeature.merge import along, merged_surface
 from ridgefeature.on_base import surface_on
 from ridgefeature.scan import Scan, Source
@@ -74,7 +75,7 @@ class Ridge(Stations):
     @property
     def groove(self) -> bool:
         """Whether it is a groove: its height is below 0 along most of it."""
-        return bool(np.median(self.height) < 0)
+        return bool(median(self.height) < 0)
 
     @property
     def _meets_itself(self) -> bool:
@@ -205,7 +206,7 @@ class Ridge(Stations):
                 f"between: expected a stretch of three stations or more, which are {step:.4g} apart, "
                 f"got {high - low:.4g}; choose a longer one"
             )
-        ramp = min((high - low) / 3, float(np.median(self.width)))
+        ramp = min((high - low) / 3, median(self.width))
         # An end of the ridge needs no ramp: there is nothing beyond it to blend with.
         rise = 1.0 if low <= 0 and not self.closed else np.clip((at - low) / ramp, 0, 1)
         fall = 1.0 if high >= self.length and not self.closed else np.clip((high - at) / ramp, 0, 1)
@@ -270,7 +271,7 @@ class Ridge(Stations):
             "closed": self.closed,
             "stop_start": self.stop[0],
             "stop_end": self.stop[1],
-            "noise": float(np.median([t.scale for t in self.templates])),
+            "noise": median([t.scale for t in self.templates]),
             "M": float(np.mean([t.M for t in self.templates])),
             "M_floor": float(np.mean([t.M_floor for t in self.templates])),
             "settings": asdict(self.settings),

@@ -12,6 +12,7 @@ from ridgefeature.ends import trends
 from ridgefeature.improve import improve, loss_of
 from ridgefeature.kernels import appraise
 from ridgefeature.march import Track
+from ridgefeature.medians import median
 from ridgefeature.neighbours import FEWEST, HOME, TYPICAL, advances, alike, between
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -83,7 +84,7 @@ def opened(window: Window, ring: list[Template], settings: Settings) -> list[Tem
     ring = trends(ring, closed=True)
     gain, owner, step = _base_over_ridge(window, ring, settings)
     low, high, most = _largest_run(gain)
-    width = float(np.median([t.width for t in ring]))
+    width = median([t.width for t in ring])
     if most < _BEYOND_DOUBT or (high - low) * step < _SHORTEST_GAP * width:
         return None
     inside = np.arange(low, high, dtype=np.intp) % len(gain)
@@ -112,7 +113,7 @@ def _base_over_ridge(window: Window, ring: list[Template], settings: Settings) -
     """
     n = len(ring)
     apart = [float(np.linalg.norm(ring[(i + 1) % n].position - t.position)) for i, t in enumerate(ring)]
-    step = float(np.median([t.width for t in ring])) / _BINS_PER_WIDTH
+    step = median([t.width for t in ring]) / _BINS_PER_WIDTH
     gains: list[Array] = []
     owners: list[Places] = []
     for i, template in enumerate(ring):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import basis_matrix
 from ridgefeature.free_section import FREE, LEARNED, Told, smoothest_section, top_knots
+from ridgefeature.medians import median
 from ridgefeature.section import box
 from ridgefeature.smearing import Smeared
 
@@ -76,7 +77,7 @@ def section_std(
         return math.sqrt(max(float(of @ covariance @ of) - known, 0.0))
 
     (low, high), (left, right) = moved(0.5), moved(_TOP)
-    blur = float(np.median(seen.blur))
+    blur = median(seen.blur)
     half = math.hypot(
         std(high - low, section.half_height_width**2 * common[1]), _HALF_BLUR[exact] * blur, gap
     )

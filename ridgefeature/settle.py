@@ -215,9 +215,10 @@ def finish_ends(window: Window, track: Track, settings: Settings) -> Track:
 def _still_back(templates: list[Template], stop: tuple[str, str], settings: Settings) -> tuple[str, str]:
     """Why both ends stopped; one that ran back into the ridge did not if what lay there dropped out."""
     reasons = list(stop)
-    for i, chain in ((0, [reverse(t) for t in reversed(templates)]), (1, templates)):
+    for i in (0, 1):
         if reasons[i] != RAN_BACK:
             continue
+        chain = templates if i else [reverse(t) for t in reversed(templates)]
         ahead = append(chain, settings)[0]
         if all(met(ahead.slid(x * ahead.length), chain[:-2]) < 0 for x in (0.0, 1.0)):
             reasons[i] = FLAT

@@ -12,6 +12,7 @@ from ridgefeature.kernels.scores import scores, section_scores
 from ridgefeature.kernels.smeared import log_likelihood as kernel
 from ridgefeature.kernels.smeared import smeared, smeared_basis
 from ridgefeature.kernels.strip import H, W
+from ridgefeature.medians import median
 from ridgefeature.path_frame import NODES_A_WIDTH
 from ridgefeature.section import Section
 
@@ -120,8 +121,8 @@ def likelihood_section_scores(
 
 def _fine_rule(h: Array, w: Array, section: Section, noise: float) -> tuple[Array, Array]:
     """Places and shares of a quadrature up the flanks of a ridge of these heights and widths."""
-    blur = float(np.clip(noise / np.median(w), _LEAST_BLUR, _MOST_BLUR))
-    steepest = float(np.median(np.abs(h) / w) * np.abs(section(np.linspace(-0.5, 0.5, 401), 1)).max())
+    blur = float(np.clip(noise / median(w), _LEAST_BLUR, _MOST_BLUR))
+    steepest = float(median(np.abs(h) / w) * np.abs(section(np.linspace(-0.5, 0.5, 401), 1)).max())
     # Up a flank the places of the quadrature stand no further apart than the noise reaches.
     return _even_rule(
         blur, max(min(_FINE, _APART * blur / max(steepest, 1.0)), 2.0 * _REACH * blur / _MOST_PLACES)

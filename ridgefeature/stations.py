@@ -11,6 +11,7 @@ from ridgefeature.basis import basis_matrix, periodic_interpolation
 from ridgefeature.bspline import Curve
 from ridgefeature.kernels.base import on_base, standing
 from ridgefeature.kernels.natural_spline import natural_spline_matrix
+from ridgefeature.medians import median
 from ridgefeature.merge import LEAST_BORDER
 from ridgefeature.settings import Settings
 from ridgefeature.template import Template
@@ -78,7 +79,7 @@ def arc_lengths(path: Curve, sites: Array, per_site: int = 32) -> tuple[Array, A
 
 def unit(vectors: Array) -> Array:
     """Vectors (..., 3) at length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), dtype=np.float64)
+    return np.asarray(vectors / np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True)), dtype=np.float64)
 
 
 def _on_path(template: Template, x: float) -> Array:
@@ -102,7 +103,7 @@ def in_line(templates: tuple[Template, ...]) -> tuple[Template, ...]:
 
     Their fit went wrong: what lies between the neighbours is known better without them.
     """
-    usual = _SCATTERED * float(np.median([t.scale for t in templates]))
+    usual = _SCATTERED * median([t.scale for t in templates])
     heights = [abs(t.height) for t in templates]
 
     def astray(i: int) -> bool:
@@ -237,7 +238,7 @@ def _sizes(
     width = np.maximum(spread @ widths, 0.25 * widths.min())
     heights = np.array([q.height for q in templates])
     # Beyond the last centres both go on straight, but neither vanishes nor changes its sign.
-    sign = 1.0 if np.median(heights) > 0 else -1.0
+    sign = 1.0 if median(heights) > 0 else -1.0
     height = sign * np.maximum(sign * (spread @ heights), 0.05 * np.abs(heights).min())
     known = np.where(np.isfinite(std), std, 0.0)
     unknown = (np.abs(spread) > 1e-9) @ ~np.isfinite(std)  # a product of 0 and infinity is no number

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.joint_rounds import State, Task, chance, improved
 from ridgefeature.kernels.strip import E, H, W
+from ridgefeature.medians import median
 from ridgefeature.noise import first_noise
 from ridgefeature.section import Section, box
 from ridgefeature.shaping import with_half_height_width
@@ -30,7 +31,7 @@ def _topped(points: Array, terms: Array, section: Section) -> Array:
     if not on.any():
         return terms
     out = terms.copy()
-    out[:, H] *= float(np.median(points[on, 2] / terms[place[on], H]) / np.median(section(eta[on])))
+    out[:, H] *= float(median(points[on, 2] / terms[place[on], H]) / median(section(eta[on])))
     return out if out[:, H] @ terms[:, H] > 0 else terms
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.grid import Grid
+from ridgefeature.medians import median
 from ridgefeature.refit import CORRELATED, Refit, refitted
 from ridgefeature.section import Section
 from ridgefeature.settings import Settings
@@ -52,4 +53,4 @@ def fitted_over_ground(
 def _hollow(found: Refit) -> bool:
     """Whether the base curves up from the spine to both feet, by a part of the height."""
     at = found.stations
-    return float(np.median(at.curvature * at.width**2 / (8.0 * at.height))) > _DEEP
+    return median(at.curvature * at.width**2 / (8.0 * at.height)) > _DEEP

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.alternatives import distinct
 from ridgefeature.march import GOES_ON, Track
+from ridgefeature.medians import median
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
 from ridgefeature.window import Window
@@ -21,7 +22,7 @@ _UNKNOWN = 0.5
 
 def too_large(track: Track, extent: float, settings: Settings) -> str:
     """Why what was found is as wide as the scan, or a mere fin; empty if it is neither."""
-    width = float(np.median([t.width for t in track.templates]))
+    width = median([t.width for t in track.templates])
     if width > settings.widest * extent:
         return f"what rises there is {width:.4g} wide, on a scan of about {extent:.4g}"
     return fin(np.array([t.height for t in track.templates]), width, settings)
@@ -29,7 +30,7 @@ def too_large(track: Track, extent: float, settings: Settings) -> str:
 
 def fin(height: Array, width: float, settings: Settings) -> str:
     """Why heights on so wide a foot are a mere fin's, as of an edge that is taken for a ridge; else empty."""
-    usual = float(np.median(np.abs(height)))
+    usual = median(np.abs(height))
     return (
         f"what rises there is {usual:.4g} high and {width:.4g} wide"
         if usual > settings.steepest * width
@@ -44,7 +45,7 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings)
     longer than wide.
     """
     templates = track.templates
-    width = float(np.median([t.width for t in templates]))
+    width = median([t.width for t in templates])
     whole = not any(why.startswith(GOES_ON) for why in track.stop)
     length = sum(t.length for t in templates)
     if whole and length < settings.shortest * width:
@@ -77,7 +78,7 @@ def unknown_height(stations: Stations) -> str:
         return f"the width of what was fitted there falls to {stations.width.min():.4g}"
     height, std = np.abs(stations.height), stations.height_std
     told = np.isfinite(std)
-    if not told.any() or np.median(std[told] / np.maximum(height[told], 1e-300)) <= _UNKNOWN:
+    if not told.any() or median(std[told] / np.maximum(height[told], 1e-300)) <= _UNKNOWN:
         return ""
-    found, known = np.median(height), np.median(std[told])
+    found, known = median(height), median(std[told])
     return f"the height of what was fitted there, {found:.4g}, is known to {known:.4g} only"

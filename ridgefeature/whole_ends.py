@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ridgefeature.held_ends import same_ridge, windows
 from ridgefeature.joint import Joint
 from ridgefeature.kernels.strip import A, B, C, E, H, W
+from ridgefeature.medians import median
 from ridgefeature.path_frame import NODES_A_WIDTH
 
 Array = NDArray[np.float64]
@@ -114,12 +115,12 @@ def _end_of(
     inside = (path.at >= start) & (path.at <= end)
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
     count = windows(joint.counts, near)
-    dense = count > _DENSE * np.median(count[inside[:-near]])
+    dense = count > _DENSE * median(count[inside[:-near]])
     found, height, half, above = shown
-    half = np.where(above * np.median(path.height[inside]) > 0, half, 0.0)
+    half = np.where(above * median(path.height[inside]) > 0, half, 0.0)
     seen = (found > VISIBLE) & (half[one - one // 2 :][: len(found)] > _OUTER)
     last_width, last_part = joint.terms[max(high - one, 0) : high + 1, H], before.terms[-near:, H]
-    usual = [float(np.median(heights)) for heights in (last_width, last_part)]
+    usual = [median(heights) for heights in (last_width, last_part)]
     k = _end(seen, height, dense, usual, high, one, near, ahead * one + near)
     end = _likeliest(joint, end if k == high else float(path.at[k]), dense, near, k == high)
     high = int(np.searchsorted(path.at, end, "right")) - 1
@@ -194,7 +195,7 @@ def _told(joint: Joint, place: float) -> tuple[Array, Array]:
         return np.empty(0), np.empty(0)
     terms = 0.5 * (joint.terms[1:] + joint.terms[:-1])
     slope, level = np.polyfit(from_end[known], terms[known, H], 1)
-    sign = np.sign(np.median(terms[known, H]))
+    sign = np.sign(median(terms[known, H]))
     height = sign * np.maximum(sign * (level + slope * from_end), 0.0)
     near = np.flatnonzero((from_end > -_BEFORE[0]) & (from_end < BEYOND))
     gain = _gain(joint.matrix[near], joint.goal[near], terms[near], height[near])
@@ -219,7 +220,7 @@ def end_interval(joint: Joint, place: float, outwards: int) -> tuple[float, floa
     if len(places):
         likely = places[gain > gain.max() - _LIKELY]
         low, high = min(likely[0], place) - slack, max(likely[-1], place) + slack
-        if abs(joint.terms[i, H]) < _FADED * float(np.median(np.abs(joint.terms[:, H]))):
+        if abs(joint.terms[i, H]) < _FADED * median(np.abs(joint.terms[:, H])):
             low, high = low - _FADING * local, max(high, _last_shown(joint, place) + slack)
     return low, high
 

@@ -15,6 +15,7 @@ from ridgefeature.continuation import append, corners
 from ridgefeature.curvature import Found
 from ridgefeature.improve import improve
 from ridgefeature.kernels.base import flattened, seen_from, turning
+from ridgefeature.kernels.base_terms import summed
 from ridgefeature.section import bell, dome
 
 RADIUS = 50.0
@@ -52,6 +53,22 @@ def test_what_is_known_of_terms_turns_with_them(angle):
     np.testing.assert_allclose(
         np.linalg.inv(turned.information[0]), there @ np.linalg.inv(found.information[0]) @ there.T, atol=1e-6
     )
+
+
+@given(st.integers(1, 6), st.integers(0, 99))
+def test_what_several_templates_know_is_summed_as_dense_algebra_does(n, seed):
+    random = np.random.default_rng(seed)
+    terms, roots = random.normal(size=(n, 3)), random.normal(size=(n, 3, 3))
+    known, degrees = roots @ roots.swapaxes(1, 2), random.uniform(1, 50, n)
+    known[:: n + 1] *= seed % 3 > 0
+    mean, of_mean, of_all, told = summed(terms, known, degrees)
+    whole = known.sum(axis=0)
+    expected = np.zeros(3) if not whole.any() else np.linalg.solve(whole, np.einsum("nij,nj", known, terms))
+    np.testing.assert_allclose(mean, expected, rtol=1e-6, atol=1e-9)
+    assert of_mean == pytest.approx(degrees.sum() * np.log1p(mean @ whole @ mean / degrees.sum()), rel=1e-9)
+    each = np.einsum("ni,nij,nj->n", terms, known, terms)
+    assert of_all == pytest.approx((degrees * np.log1p(each / degrees)).sum(), rel=1e-9)
+    assert told == (each > 0).sum()
 
 
 def scan(distance, half, n, noise, share, section, height):

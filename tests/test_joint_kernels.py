@@ -11,7 +11,7 @@ from ridgefeature.kernels.banded import factor, inverse_band, solve
 from ridgefeature.kernels.information import information
 from ridgefeature.kernels.penalised import assembled, most_likely
 from ridgefeature.kernels.section_sums import misfit_sums
-from ridgefeature.kernels.strip import TERMS, A, H, W, mixture, offsets, rectified
+from ridgefeature.kernels.strip import TERMS, A, H, W, mixture, offsets, rectified, share_of_surface
 from ridgefeature.section import bell
 from ridgefeature.smearing import smear
 from ridgefeature.smoothing import ORDERS, basis_at
@@ -186,6 +186,14 @@ def test_height_and_width_have_no_bias_under_much_noise(strays, h, noise, even):
     assert scale == pytest.approx(noise, rel=0.06)
     # Strays that lie among the others are not told from them.
     assert share == pytest.approx(strays, abs=0.05)
+
+
+def test_the_share_of_the_surface_is_that_of_normal_noise_against_even_strays():
+    r, stray = np.linspace(-12.0, 12.0, 4001), 0.03
+    shares = np.array([share_of_surface(x, 0.5, stray) for x in r])
+    expected = 1.0 / (1.0 + stray / 0.5 * np.exp(np.minimum(0.5 * r**2, 50.0)))
+    np.testing.assert_allclose(shares, expected, rtol=1e-11)
+    assert shares[0] == share_of_surface(1e200, 0.5, stray) > 0
 
 
 def test_information_is_the_sum_over_the_points_whatever_their_order():

@@ -193,9 +193,30 @@ def _inverse(a: Floats) -> Floats:
 
 
 @njit(cache=True)
-def solved(a: Floats, b: Floats) -> Floats:
-    """x (3,) with a x = b, a symmetric positive definite (3, 3); zeros where it is none."""
-    return _times(_inverse(a), b)
+def summed(terms: Floats, information: Floats, known: Floats) -> tuple[Floats, float, float, int]:
+    """Mean (3,) of terms (n, 3) by their information (n, 3, 3), zeros where that is not enough; twice the log
+    likelihood ratios of the mean and of all terms against zero; how many are told from it at all.
+
+    By Student's distribution: known (n,) are the degrees of freedom of each one's noise.
+    """
+    whole, pull = np.zeros((3, 3)), np.zeros(3)
+    degrees = of_all = 0.0
+    told = 0
+    for n in range(terms.shape[0]):
+        own = _times(information[n], terms[n])
+        square = 0.0
+        for i in range(3):
+            pull[i] += own[i]
+            square += own[i] * terms[n, i]
+            for k in range(3):
+                whole[i, k] += information[n, i, k]
+        degrees += known[n]
+        of_all += known[n] * math.log1p(square / known[n])
+        told += square > 0.0
+    mean = _times(_inverse(whole), pull)
+    own = _times(whole, mean)
+    square = mean[0] * own[0] + mean[1] * own[1] + mean[2] * own[2]
+    return mean, degrees * math.log1p(square / degrees), of_all, told
 
 
 @njit(cache=True)
