@@ -78,7 +78,7 @@ def test_a_saved_page_is_the_same_page(tmp_path: Path) -> None:
     assert none is None and empty.features == () and empty.chosen is None
 
 
-@pytest.mark.parametrize("damage", ["cut", "none", "version", "rate", "points"])
+@pytest.mark.parametrize("damage", ["cut", "none", "bytes", "version", "rate", "points"])
 def test_damaged_pages_are_told(tmp_path: Path, damage: str) -> None:
     path, other = tmp_path / "a.ridgepage", tmp_path / "b.ridgepage"
     saved.save(path, scan(), session())
@@ -87,6 +87,9 @@ def test_damaged_pages_are_told(tmp_path: Path, damage: str) -> None:
         other.write_bytes(data[: len(data) // 2])
     elif damage == "none":
         other.write_bytes(b"not a page")
+    elif damage == "bytes":
+        at = data.index(b"points.npy") + 200
+        other.write_bytes(data[:at] + bytes(255 - x for x in data[at : at + 40]) + data[at + 40 :])
     else:
         with zipfile.ZipFile(path) as old, zipfile.ZipFile(other, "w") as new:
             for entry in old.namelist():

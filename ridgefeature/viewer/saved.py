@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def load(path: Path) -> tuple[Scan | None, Session]:
             if told["version"] != _VERSION:
                 raise ValueError(f"version {told['version']}")
             return _scan(archive, told["scan"]), _session(archive, told)
-    except (zipfile.BadZipFile, KeyError, TypeError, EOFError, ValueError) as error:
+    except (zipfile.BadZipFile, zlib.error, KeyError, TypeError, EOFError, ValueError) as error:
         raise ValueError(
             f"{path.name}: expected a page saved by ridgefeature, version {_VERSION}, got none "
             f"({error}); save it again"
