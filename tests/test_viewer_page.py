@@ -342,6 +342,14 @@ def test_the_view_is_moved_by_keys(page: Page) -> None:
     assert page.tell.dark
 
 
+def test_the_scale_bar_fits_the_picture_whatever_its_size(page: Page) -> None:
+    page.look("fit")
+    for size in ((900, 620), (900, 310)):
+        page.scene.window.SetSize(*size)
+        told = float(page.tell.bar_text.split()[0])
+        assert page.tell.bar * page.scene.length_of_pixel() == pytest.approx(told)
+
+
 def test_files_are_opened_by_name_in_the_working_folder_only(work: Work, tmp_path: Path) -> None:
     page = work.page
     np.save(tmp_path / "own.npy", scan().points[:5000])

@@ -56,6 +56,7 @@ class Page:
         self.sizes = Sizes(self)
         self._painted: Ridge | None = None
         self._own_colours: Pixels | None = None
+        scene.window.AddObserver("WindowResizeEvent", lambda *_: self._resized())
 
     @property
     def session(self) -> Session:
@@ -224,6 +225,10 @@ class Page:
         pixel = self.scene.length_of_pixel()
         length = round_below(110.0 * pixel)
         self.tell.bar, self.tell.bar_text = length / pixel, f"{number(length)} {self.tell.unit}"
+
+    def _resized(self) -> None:
+        with self.tell:
+            self.scale()
 
     def say(self, text: str, bad: bool = False) -> None:
         self.tell.hint, self.tell.bad = text, bad
