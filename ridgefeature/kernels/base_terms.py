@@ -200,8 +200,7 @@ def summed(terms: Floats, information: Floats, known: Floats) -> tuple[Floats, f
     By Student's distribution: known (n,) are the degrees of freedom of each one's noise.
     """
     whole, pull = np.zeros((3, 3)), np.zeros(3)
-    degrees = of_all = 0.0
-    told = 0
+    told, degrees, of_all = 0, 0.0, 0.0
     for n in range(terms.shape[0]):
         own = _times(information[n], terms[n])
         square = 0.0

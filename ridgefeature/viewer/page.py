@@ -189,12 +189,11 @@ class Page:
             self.scene.paint(self._own_colours)
             self.scene.faint, self.tell.colouring, self.tell.legend = False, "file", []
             return
-        deviation = by == "deviation" and feature is not None
-        self._painted = feature.registered if feature is not None and deviation else None
-        if deviation and feature is not None:
-            colouring = by_deviation(feature.registered.distance(points))
-        else:
-            colouring = by_height(points)
+        self._painted = feature.registered if feature is not None and by == "deviation" else None
+        deviation = self._painted is not None
+        colouring = (
+            by_height(points) if self._painted is None else by_deviation(self._painted.distance(points))
+        )
         self.scene.paint(colouring.pixels)
         self.scene.faint = deviation
         unit = self.tell.unit
