@@ -59,7 +59,7 @@ def test_what_is_known_of_terms_turns_with_them(angle):
 def test_what_several_templates_know_is_summed_as_dense_algebra_does(n, seed):
     random = np.random.default_rng(seed)
     terms, roots = random.normal(size=(n, 3)), random.normal(size=(n, 3, 3))
-    known, degrees = roots @ roots.swapaxes(1, 2), random.uniform(1, 50, n)
+    known, degrees = roots @ roots.swapaxes(1, 2) + 0.1 * np.eye(3), random.uniform(1, 50, n)
     known[:: n + 1] *= seed % 3 > 0
     mean, of_mean, of_all, told = summed(terms, known, degrees)
     whole = known.sum(axis=0)
