@@ -28,6 +28,11 @@ def round_below(value: float) -> float:
     return float(max(m for m in (1, 2, 5) if m * power <= value * (1 + 1e-12)) * power)
 
 
+def reason(error: Exception) -> str:
+    """What is wrong, without the advice for a script that follows it."""
+    return str(error).partition(";")[0]
+
+
 def rows(ridge: Ridge, found: Diagnosis) -> list[tuple[str, str]]:
     """The diagnosis for people: names and values."""
     unit = ridge.unit

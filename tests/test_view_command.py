@@ -52,6 +52,7 @@ def test_without_the_token_there_is_no_page(tmp_path: Path) -> None:
     ("words", "told"),
     [
         (["nothere.npy"], "nothere.npy: No such file or directory"),
+        (["here.npy"], "here.npy: "),
         (["here.npy", "--unit", "parsec"], "expected a length unit"),
         (["--port", "99999"], "99999"),
         (["--upload", "0"], "0"),

@@ -24,6 +24,7 @@ from ridgefeature.viewer.marching import March
 from ridgefeature.viewer.page import TOLD, Page
 from ridgefeature.viewer.part_preview import PartPreview
 from ridgefeature.viewer.scene import Scene
+from ridgefeature.viewer.serve import triggers
 from ridgefeature.viewer.session import History, Session
 from ridgefeature.viewer.sizes import FIELDS
 from ridgefeature.viewer.work import Work
@@ -238,6 +239,25 @@ def test_a_stretch_is_chosen_on_the_curves(found: Page) -> None:
     assert found.feature is not None and found.feature.between == (0.0, length)
 
 
+def test_the_dot_under_the_cursor_leaves_with_it_and_the_picked_place_stays(work: Work) -> None:
+    page = work.page
+    asyncio.run(work.click(*on(page, (20.0, 15.0, 0.0))))
+    page.hover(*on(page, (45.0, 0.0, HEIGHT)))
+    assert {"pick", "hover"} <= set(page.scene.names())
+    page.away()
+    assert "pick" in page.scene.names() and "hover" not in page.scene.names()
+
+
+def test_what_is_wrong_with_a_value_stays_told_as_the_page_comes_to_rest(work: Work, found: Page) -> None:
+    ask = triggers(found, work)
+    for field, value, told in (("height", "1000", "height: expected"), ("h", 7.5, "h: expected a rate")):
+        found.sizes.edited({**found.sizes.fields, field: value})
+        ask["rest"]()
+        assert found.tell.bad and found.tell.hint.startswith(told)
+    ask["reset"]()
+    assert not found.tell.bad
+
+
 def test_curves_and_view_point_at_the_same_place(found: Page) -> None:
     length = registered().length
     found.point(curves.part_of(0.25 * length, length))
@@ -422,6 +442,23 @@ def test_a_part_follows_the_sliders_and_the_click(work: Work, found: Page, unche
     assert taller == same and taller > 0
 
 
+def test_a_part_stays_as_it_was_where_it_cannot_be_put(work: Work, found: Page, unchecked: None) -> None:
+    async def story() -> None:
+        await work.preview.paste()
+        assert work.preview.part is not None
+        volume, points = work.preview.part.solid.Volume(), work.preview.part.points
+        across, along = 0.98 * points[:, :2].max(axis=0)
+        await work.preview.put(*on(found, (across, along, work.preview._host[3][2])))
+        assert work.preview._task is not None
+        await work.preview._task
+        assert found.tell.bad and found.tell.hint.endswith("It stays where it was.")
+        assert "=" not in found.tell.hint, "that is for scripts"
+        assert work.preview.part is not None and found.tell.part_note
+        assert work.preview.part.solid.Volume() == volume
+
+    asyncio.run(story())
+
+
 def test_what_cannot_be_pasted_is_told(work: Work, found: Page, tmp_path: Path) -> None:
     import cadquery as cq
 
@@ -441,6 +478,7 @@ def test_what_cannot_be_pasted_is_told(work: Work, found: Page, tmp_path: Path) 
         assert found.tell.hint.startswith("There is no part here")
 
     asyncio.run(story())
+    assert "=" not in found.tell.hint
     with pytest.raises(ValueError, match="expected a part with a ridge"):
         asyncio.run(work.take("part", "", tmp_path))
     cq.exporters.export(cq.Workplane().rarray(30, 1, 2, 1).box(10, 10, 10), str(path))

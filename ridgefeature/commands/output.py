@@ -83,7 +83,7 @@ def rows(ridge: Ridge, found: Diagnosis | None = None) -> list[tuple[str, str]]:
         ),
         ("pick", pick(ridge)),
         *(
-            [("noise", f"{number(figures['noise'], 3)} {unit}"), *ends(ridge)]
+            [("noise level", f"{number(figures['noise'], 3)} {unit}"), *ends(ridge)]
             if found is None
             else trust(ridge, found)
         ),

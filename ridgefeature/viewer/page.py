@@ -165,6 +165,11 @@ class Page:
         self.pointing.hover(self.feature, across, down)
         self.draw()
 
+    def away(self) -> None:
+        """As `Pointing.away`."""
+        self.pointing.away()
+        self.draw()
+
     def point(self, part: float) -> None:
         """As `Pointing.point`."""
         if self.feature is not None:
@@ -287,7 +292,7 @@ class Page:
         sizes = self.sizes
         own = (
             self.undo, self.redo, self.set_unit, self.choose, self.toggle, self.remove, self.rename,
-            self.rest, self.hover, self.point, self.step, self.colour, self.theme,
+            self.rest, self.hover, self.away, self.point, self.step, self.colour, self.theme,
             sizes.reset, sizes.stretch, sizes.bound, sizes.whole,
         )  # fmt: skip
         moves = {how: partial(self.look, how) for how in ("fit", "turn", "zoom", "pan")}

@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ridgefeature.readable import reason
+from ridgefeature.ridge import Ridge
 from ridgefeature.viewer import preview
 from ridgefeature.viewer.page import HINT, Page
 from ridgefeature.viewer.session import Feature
@@ -39,6 +41,8 @@ class PartPreview:
         self._host: tuple[Any, ...] = ()
         """Kind, ridge, solid and the place where the ridge goes first."""
         self._at: Array | None = None
+        self._good: tuple[Ridge, Array] | None = None
+        """What was pasted last on this host, and where."""
         self._task: asyncio.Task[None] | None = None
         self._again = False
 
@@ -57,7 +61,7 @@ class PartPreview:
             return
         if not page.tell.pasting:
             page.scene.keep_camera()
-        self._host, self._at, self.part = (), None, None
+        self._host, self._at, self._good, self.part = (), None, None, None
         with page.tell:
             page.tell.pasting, page.tell.part_note = True, ""
         self._begin()
@@ -97,21 +101,34 @@ class PartPreview:
             self._task = asyncio.get_running_loop().create_task(self._work())
 
     async def _work(self) -> None:
-        page = self.page
+        page, wrong = self.page, ""
         while self._again and page.tell.pasting:
             self._again = False
             with page.tell:
                 page.tell.busy, page.tell.count = "Pasting", 0
             try:
-                await self._once()
+                await self._once(wrong)
+                wrong = ""
             except (ValueError, OSError) as error:
-                self.part, page.tell.part_note = None, ""
-                await self._show_host()
-                page.say(f"It cannot be pasted there: {error}", bad=True)
+                wrong = await self._back(f"It cannot be pasted there: {reason(error)}.")
             with page.tell:
                 page.tell.busy = ""
 
-    async def _once(self) -> None:
+    async def _back(self, wrong: str) -> str:
+        """After what went wrong: to the place where the same ridge was before, or to the bare host."""
+        page, good, here = self.page, self._good, self._at
+        self.part, self._good, page.tell.part_note = None, None, ""
+        if self._again:
+            return ""
+        if good and page.feature is not None and good[0] is page.feature.ridge and good[1] is not here:
+            self._at, self._again = good[1], True
+            return f"{wrong} It stays where it was."
+        await self._show_host()
+        page.say(wrong, bad=True)
+        return ""
+
+    async def _once(self, wrong: str) -> None:
+        """Paste. wrong: what the page goes on telling, if it is not empty."""
         page, feature = self.page, self.page.feature
         if feature is None:
             return
@@ -126,11 +143,13 @@ class PartPreview:
             return
         self.part = part
         page.scene.show_part(part.points, part.host, part.grown)
-        if first and self._host[3] is not None:
+        if first and self._host[3] is not None and not wrong:
             page.scene.look_at_part(part.points, part.grown)
-        page.say(_LIVE)
+        page.say(wrong or _LIVE, bad=bool(wrong))
         page.draw()
+        at = self._at
         await self._check(part)
+        self._good = feature.ridge, at
 
     async def _choose_host(self, feature: Feature) -> None:
         kind = str(self.page.tell.host)

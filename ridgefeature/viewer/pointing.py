@@ -37,13 +37,17 @@ class Pointing:
         if self.tell.pasting or not len(self.scene.still):
             return
         place = self.scene.pick(across, down, coarsely=True)
-        self.scene.mark(place, "pick", 9.0)
+        self.scene.mark(place, "hover", 9.0)
         if place is not None and feature is not None and feature.shown:
             s, y, _ = (float(x[0]) for x in local_coordinates(feature.ridge, place[None]))
             if 0.0 <= s <= feature.ridge.length and abs(y) < np.interp(
                 s, feature.ridge.arc_length, feature.ridge.width
             ):
                 self.show(feature, s)
+
+    def away(self) -> None:
+        """The cursor has left the view."""
+        self.scene.mark(None, "hover")
 
     def point(self, feature: Feature, part: float) -> None:
         """The cursor is over the curves, at a part of their width: the place is marked on the ridge."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import secrets
-import sys
 import tempfile
 import webbrowser
 from collections.abc import Callable
@@ -22,6 +21,8 @@ from ridgefeature.viewer.work import Work
 
 UPLOAD = 2**30
 """Bytes of the largest file that the page takes."""
+_SOON = 1.0
+"""Seconds for which the page waits for its first scan."""
 _HERE = Path(__file__).parent
 
 
@@ -37,7 +38,8 @@ def serve(
     """Serve the page until it is interrupted.
 
     scan: a file to open first; host, port: address, 0 for a free port; upload: bytes of the largest file that
-    may be sent; ready: called with the page's address, once it is there.
+    may be sent; ready: called with the page's address, once it is there. Raises ValueError or OSError where
+    the scan is none.
     """
     os.environ.setdefault("WSLINK_READY_MSG", "")  # which else is printed
     from trame.app import get_server
@@ -47,7 +49,7 @@ def serve(
     page = Page(server.state, scene, lambda: view.update())
     work = Work(page, Path.cwd())
     view = _markup(server, scene, work.files())
-    for name, what in _triggers(page, work).items():
+    for name, what in triggers(page, work).items():
         server.controller.trigger(name)(what)
 
     @server.state.change(*FIELDS)
@@ -55,6 +57,7 @@ def serve(
         if page.sizes.edited({field: told[field] for field in FIELDS}):
             work.preview.again()
 
+    wrong: list[Exception] = []
     with tempfile.TemporaryDirectory(prefix="ridgefeature-") as folder:
         names = LOOPBACK if host in ("127.0.0.1", "localhost", "::1") else (*LOOPBACK, host)
 
@@ -65,12 +68,20 @@ def serve(
 
         async def begun(**_: Any) -> None:
             asyncio.get_running_loop().set_exception_handler(_unless_gone)
-            address = f"http://{host}:{server.port}/?token={token}"
-            ready(address)
-            if open_browser:
-                webbrowser.open(address)
-            if scan is not None:
-                await _opened(work, scan, unit)
+            opening = asyncio.ensure_future(_opened(work, scan, unit))
+            # What is soon found to be no scan is told before there is a page.
+            await asyncio.wait({opening}, timeout=_SOON)
+            if not opening.done() or not opening.exception():
+                address = f"http://{host}:{server.port}/?token={token}"
+                ready(address)
+                if open_browser:
+                    webbrowser.open(address)
+            try:
+                await opening
+            except (ValueError, OSError) as error:
+                wrong.append(error)
+                await server.stop()
+                return
             await work.warm()
 
         server.controller.on_server_bind.add(bind)
@@ -83,15 +94,13 @@ def serve(
             show_connection_info=False,
             disable_logging=True,
         )
+    if wrong:
+        raise wrong[0]
 
 
-async def _opened(work: Work, scan: Path, unit: str | None) -> None:
-    try:
+async def _opened(work: Work, scan: Path | None, unit: str | None) -> None:
+    if scan is not None:
         await work.open(scan, scan.name, unit)
-    except (ValueError, OSError) as error:
-        print(f"ridgefeature: {error}", file=sys.stderr, flush=True)
-        with work.page.tell:
-            work.page.say(str(error), bad=True)
 
 
 def _markup(server: Any, scene: Scene, files: list[str]) -> Any:
@@ -117,7 +126,7 @@ def _markup(server: Any, scene: Scene, files: list[str]) -> Any:
     return view
 
 
-def _triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
+def triggers(page: Page, work: Work) -> dict[str, Callable[..., None]]:
     """All that the page may ask for. What takes long is begun, and asked for by nobody twice."""
 
     def begin(what: Callable[..., Any]) -> Callable[..., None]:
@@ -171,7 +180,7 @@ def _told(page: Page, what: Callable[..., None], *values: Any) -> None:
     except (ValueError, TypeError, KeyError) as error:
         page.say(str(error), bad=True)
     else:
-        if wrong and page.tell.bad and what not in (page.hover, page.point):
+        if wrong and page.tell.bad and what not in (page.hover, page.away, page.point, page.rest):
             page.say("" if page.tell.pasting else HINT)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ridgefeature.diagnosis import diagnose
 from ridgefeature.io.colours import Pixels, colours_at
 from ridgefeature.io.read import FORMATS, read_scan
+from ridgefeature.readable import reason
 from ridgefeature.registration import NoRidgeError, register
 from ridgefeature.ridge import Ridge
 from ridgefeature.synthetic import Spiral
@@ -131,7 +132,7 @@ class Work:
         try:
             ridge = task.result()
         except NoRidgeError as error:
-            page.say(f"There is no ridge here: {_reason(error)}. Click on the crest of one.", bad=True)
+            page.say(f"There is no ridge here: {reason(error)}. Click on the crest of one.", bad=True)
         except KeyboardInterrupt:
             page.say("Stopped before a template was fitted.")
         except ValueError as error:
@@ -216,8 +217,3 @@ def _rehearse() -> None:
     at = (*map(float, spiral.spine(np.array(8.0))[:2]), float(spiral.height(np.array(8.0))))
     points = spiral.points(20_000, noise=0.1)
     diagnose(register(points, at=at), points)
-
-
-def _reason(error: NoRidgeError) -> str:
-    """Why there is none, without what could be given in a script."""
-    return str(error).partition(";")[0]

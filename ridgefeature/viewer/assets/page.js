@@ -29,13 +29,17 @@
   let resting = 0;
   const rest = () => { clearTimeout(resting); resting = setTimeout(() => tell("rest"), 120); };
   document.addEventListener("wheel", (e) => { if (on(e, "#view")) rest(); }, { capture: true, passive: true });
-  let hovered = 0;
+  let hovered = 0, over = false;
   document.addEventListener("pointermove", (e) => {
     const view = on(e, "#view");
+    if (!view && over) { over = false; tell("away"); }
     if (!view || e.buttons || Date.now() - hovered < 90) return;
     hovered = Date.now();
+    over = true;
     tell("hover", ...part(e, view));
   }, true);
+
+  document.addEventListener("pointerleave", () => { if (over) { over = false; tell("away"); } });
 
   // The curves: pointing marks the place, dragging chooses a stretch.
   let from = null;
