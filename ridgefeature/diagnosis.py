@@ -74,6 +74,8 @@ class Diagnosis:
     left, more where the surface misses the points, or the noise is shared by neighbours."""
     coverage: float
     """Share of the surface between the feet with scan points near it."""
+    seen: NDArray[np.bool_]
+    """(n, m) where that is, at even places along the ridge and from the right foot to the left."""
     stretches: Array
     """(j + 1,) arc lengths between which the next three are told."""
     stretch_rms: Array
@@ -130,6 +132,7 @@ def diagnose(ridge: Ridge, scan: Scan | ArrayLike) -> Diagnosis:
         outliers=outliers,
         reduced_chi_square=_chi_square(ridge, s[kept], y[kept], d[kept], inner[kept]),
         coverage=float(seen.mean()),
+        seen=seen,
         stretches=edges,
         stretch_rms=rms,
         stretch_outliers=strays,

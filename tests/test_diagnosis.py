@@ -89,6 +89,9 @@ def test_a_stretch_without_points_is_in_doubt(ridge: rf.Ridge, points: Array) ->
     s, _ = SPIRAL.path_coordinates(points[:, :2])
     found = rf.diagnose(ridge, points[(s < 60) | (s > 90)])
     assert found.coverage == pytest.approx(1 - 30 / ridge.length, abs=0.04)
+    places = (np.arange(len(found.seen)) + 0.5) / len(found.seen) * ridge.length
+    assert not found.seen[(places > 64) & (places < 86)].any()
+    assert found.seen[(places < 56) | (places > 94)].mean() > 0.99
     ((low, high, why),) = found.doubts
     assert low == pytest.approx(60, abs=4) and high == pytest.approx(90, abs=4) and "seen" in why
 
@@ -186,6 +189,8 @@ def test_the_map_shows_the_deviations(
     kept = ~found.stray
     np.testing.assert_array_equal(at, np.column_stack([found.arc_length[kept], found.across[kept]]))
     np.testing.assert_array_equal(np.asarray(dots.get_array()), found.deviation[kept])
+    unseen = figure.axes[0].collections[1].get_array()
+    np.testing.assert_array_equal(np.ma.getmaskarray(unseen).reshape(found.seen.shape), found.seen)
     feet = [line.get_ydata() for line in figure.axes[0].lines]
     assert any(np.array_equal(np.asarray(y), 0.5 * ridge.width) for y in feet)
     said = " ".join(text.get_text() for text in figure.texts)

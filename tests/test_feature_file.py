@@ -87,6 +87,14 @@ def test_a_whole_spiral_goes_there_and_back(tmp_path):
     assert_equal(rf.load(tmp_path / "spiral.ridge.json"), spiral_ridge())
 
 
+def test_templates_keep_the_section_that_they_were_fitted_with(ridge, tmp_path):
+    learned = rf.Section(np.array([0.4, 1.0, 0.9, 0.3]), "learned")
+    other = replace(ridge, section=learned)
+    assert other.templates[0].section.name == "bell"
+    other.save(tmp_path / "other.ridge.json")
+    assert_equal(rf.load(tmp_path / "other.ridge.json"), other)
+
+
 def test_the_file_is_strict_json_with_a_version(saved):
     def refuse(word):
         raise AssertionError(f"{word} is not JSON")

@@ -68,6 +68,34 @@ def test_profile_shows_each_template_with_its_error(ridge: rf.Ridge, tmp_path: P
     np.testing.assert_allclose(spans, [2 * t.std[6] for t in ridge.templates if t.std is not None], rtol=1e-9)
 
 
+def test_a_ridge_that_was_changed_is_shown_with_what_was_registered(
+    ridge: rf.Ridge, scan: rf.Scan, tmp_path: Path
+) -> None:
+    taller = ridge.resized(h=1.4)
+    figure = plot.profile(taller, tmp_path / "p.png", scan, ridge)
+    lines = [line.get_xydata() for line in figure.axes[0].lines]
+    for one in (taller, ridge):
+        assert any(np.array_equal(line, np.column_stack([one.arc_length, one.height])) for line in lines)
+    names = figure.axes[0].get_legend_handles_labels()[1]
+    assert "as registered" in names
+    plain = plot.profile(ridge, tmp_path / "p.png", scan)
+    np.testing.assert_array_equal(*(f.axes[2].lines[0].get_xydata() for f in (figure, plain)))
+    assert "as registered" not in plain.axes[0].get_legend_handles_labels()[1]
+
+
+def test_what_is_beside_the_curve_is_in_the_picture_but_for_what_is_far_off(
+    ridge: rf.Ridge, tmp_path: Path
+) -> None:
+    first, *others = ridge.templates
+    for height, shown in ((1.4, True), (40.0, False)):
+        high = float(height * ridge.height.max())
+        odd = replace(ridge, templates=(first.changed(height=high), *others))
+        top = plot.profile(odd, tmp_path / "p.png").axes[0].get_ylim()[1]
+        assert (high < top) == shown and top < 2 * ridge.height.max()
+    wavering = replace(ridge, height_std=0.5 * ridge.height)
+    assert plot.profile(wavering, tmp_path / "p.png").axes[0].get_ylim()[1] > 1.5 * ridge.height.max()
+
+
 def test_widths_of_templates_of_another_section_are_compared_at_half_height(
     ridge: rf.Ridge, tmp_path: Path
 ) -> None:

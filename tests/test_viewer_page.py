@@ -189,7 +189,9 @@ def test_stretches_add_up(found: Page) -> None:
     assert ridge.height[3 * quarter] == pytest.approx(0.5 * HEIGHT, rel=0.05)
     found.sizes.whole()
     assert found.tell.h == 1.0 and np.array_equal(found.feature.ridge.height, ridge.height)
+    assert found.tell.earlier and found.tell.stretch == ""
     found.sizes.reset()
+    assert not found.tell.earlier
     assert np.array_equal(found.feature.ridge.height, registered().height)
 
 

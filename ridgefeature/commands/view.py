@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import webbrowser
 from pathlib import Path
 
 import click
@@ -27,6 +28,8 @@ def run(scan: Path | None, unit: str | None, host: str, port: int, upload: int, 
         if host not in LOOPBACK:
             click.echo("Whoever reaches this address and has its token may use the page.", err=True)
         click.echo(f"The page is at {address}\nCtrl-C ends it.")
+        if browser:
+            webbrowser.open(address)
 
     with interrupts.at_once():
-        serve(scan, unit, host, port, upload * _MEGABYTE, ready, browser)
+        serve(scan, unit, host, port, upload * _MEGABYTE, ready)

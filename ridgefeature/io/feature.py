@@ -40,13 +40,27 @@ def to_document(ridge: Ridge) -> dict[str, Any]:
         "closed": ridge.closed,
         "stop": list(ridge.stop),
         "end_interval": None if ridge.end_interval is None else _plain(ridge.end_interval),
-        "section": {"name": ridge.section.name, "coefficients": ridge.section.coefficients.tolist()},
+        "section": _section(ridge.section),
         "stations": _values(ridge, fields(Stations), () if _is_curved(ridge) else _OF_CURVED),
         "templates": [
             _values(t, fields(Template), {"section", *(() if _is_curved(ridge) else _OF_CURVED)})
+            | ({} if _alike(t.section, ridge.section) else {"section": _section(t.section)})
             for t in ridge.templates
         ],
     }
+
+
+def _section(section: Section) -> dict[str, Any]:
+    return {"name": section.name, "coefficients": section.coefficients.tolist()}
+
+
+def _alike(one: Section, other: Section) -> bool:
+    """Whether a template has the ridge's own section, which is then not written again."""
+    return one.name == other.name and np.array_equal(one.coefficients, other.coefficients)
+
+
+def _section_in(document: dict[str, Any]) -> Section:
+    return Section(np.array(document["coefficients"], dtype=np.float64), document["name"])
 
 
 def _is_curved(ridge: Ridge) -> bool:
@@ -70,9 +84,7 @@ def from_document(document: Any) -> Ridge:
             "read it with the release that wrote it, or update ridgefeature"
         )
     try:
-        section = Section(
-            np.array(document["section"]["coefficients"], dtype=np.float64), document["section"]["name"]
-        )
+        section = _section_in(document["section"])
         without = _OF_CURVED if document["version"] == FLAT else ()
         stations = {
             f.name: _array(document["stations"][f.name]) for f in fields(Stations) if f.name not in without
@@ -173,7 +185,9 @@ _TEMPLATE_ARRAYS = {
 
 
 def _template(document: dict[str, Any], section: Section, without: Container[str]) -> Template:
-    values: dict[str, Any] = {"section": section}
+    values: dict[str, Any] = {
+        "section": _section_in(document["section"]) if "section" in document else section
+    }
     for name in (f.name for f in fields(Template) if f.name != "section" and f.name not in without):
         value = document[name]
         if name in _TEMPLATE_ARRAYS and not (name == "std" and value is None):

@@ -24,6 +24,8 @@ _SIZE = (1700, 1000)
 _MOST = 60_000
 _LIMIT = 4.0
 """Deviations in noise levels beyond which colours do not change any more."""
+_FEW = 3_000
+"""Points below which each is drawn with a rim."""
 _STRAY, _DOUBT, _UNSEEN, _LINE = "#111827", "#fde68a", "#e5e7eb", "#334155"
 _STATUS = {"converged": "#15803d", "interpolated": "#ca8a04"}
 _OTHER = "#b91c1c"
@@ -82,27 +84,56 @@ def _map(figure: Figure, axes: Any, ridge: Ridge, found: Diagnosis) -> None:
         vmin=-_LIMIT * noise,
         vmax=_LIMIT * noise,
         s=float(np.clip(60_000 / max(len(kept), 1), 2, 40)),
-        lw=0,
+        lw=0.5 if len(kept) < _FEW else 0,
+        ec=_LINE,
         rasterized=True,
     )
+    _unseen(axes, ridge, found)
     stray = np.flatnonzero(found.stray)
     label = f"strays ({100 * found.outliers:.1f} %)" if len(stray) else "strays: none"
-    axes.plot(found.arc_length[stray], found.across[stray], ".", ms=2.5, color=_STRAY, mew=0, label=label)
+    axes.plot(
+        found.arc_length[stray],
+        found.across[stray],
+        ".",
+        ms=6 if len(kept) < _FEW else 2.5,
+        color=_STRAY,
+        mew=0,
+        label=label,
+    )
     for side in (-0.5, 0.5):
         axes.plot(
             ridge.arc_length, side * ridge.width, color=_LINE, lw=1.2, label="feet" if side > 0 else None
         )
     axes.plot([], [], color=_DOUBT, lw=8, label="in doubt")
     reach = 1.02 * float(ridge.border.max())
-    axes.set(ylim=(-reach, reach), ylabel=f"across, left is up [{ridge.unit}]", facecolor=_UNSEEN)
+    axes.set(ylim=(-reach, reach), ylabel=f"across, left is up [{ridge.unit}]")
     axes.set_title(
-        "The surface unrolled: points above it red, below it blue; grey: not seen", loc="left", fontsize=11
+        "The surface unrolled: points above it red, below it blue; grey: no points between the feet",
+        loc="left",
+        fontsize=11,
     )
     axes.legend(
-        loc="lower right", fontsize=9, framealpha=0.9, ncols=3, bbox_to_anchor=(1.0, 1.0), markerscale=4
+        loc="lower right",
+        fontsize=9,
+        framealpha=0.9,
+        ncols=3,
+        bbox_to_anchor=(1.0, 1.0),
+        markerscale=1.5 if len(kept) < _FEW else 4,
     )
     bar = figure.colorbar(dots, cax=figure.add_axes((0.735, 0.53, 0.012, 0.37)))
     bar.set_label(f"distance of points to the surface [{ridge.unit}]")
+
+
+def _unseen(axes: Any, ridge: Ridge, found: Diagnosis) -> None:
+    """Shade the surface between the feet where no scan points are near it."""
+    from matplotlib.colors import ListedColormap
+
+    n, m = found.seen.shape
+    s = np.linspace(0.0, ridge.length, n + 1)
+    feet = np.linspace(-0.5, 0.5, m + 1) * np.interp(s, ridge.arc_length, ridge.width)[:, None]
+    grey = np.ma.masked_where(found.seen, np.ones((n, m)))
+    along = np.broadcast_to(s[:, None], feet.shape)
+    axes.pcolormesh(along, feet, grey, cmap=ListedColormap([_UNSEEN]), zorder=0, rasterized=True)
 
 
 def _distances(axes: Any, ridge: Ridge, found: Diagnosis) -> None:

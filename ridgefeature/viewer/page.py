@@ -14,7 +14,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ridgefeature.curvilinear import local_coordinates
 from ridgefeature.diagnosis import Diagnosis
 from ridgefeature.readable import ends, kind, number, round_below, templates
 from ridgefeature.readable import rows as trust
@@ -35,11 +34,9 @@ TOLD: dict[str, Any] = {
     "stretch": "", "can_undo": False, "can_redo": False, "colouring": "height", "dark": False,
     "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "height": "",
     "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane", "part_note": "",
-    "host_name": "", "coloured": False,
+    "host_name": "", "coloured": False, "earlier": False,
 }  # fmt: skip
 """What the page knows, and how it begins."""
-_ON = 0.4
-"""Distance from a spine, in widths, up to which a place is on its ridge."""
 
 
 class Page:
@@ -107,18 +104,6 @@ class Page:
     def choose(self, name: str) -> None:
         self.history.now = self.session.choosing(name)
         self.refresh()
-
-    def ridge_at(self, place: Array) -> str | None:
-        """The name of a ridge that is shown and has this place (3,) of the scan between its feet."""
-        for feature in reversed(self.session.features):
-            ridge = feature.registered
-            s, y, z = (float(x[0]) for x in local_coordinates(ridge, place[None]))
-            half, high = (
-                float(np.interp(s, ridge.arc_length, np.abs(x))) for x in (ridge.width, ridge.height)
-            )
-            if feature.shown and 0.0 <= s <= ridge.length and abs(y) < _ON * half and abs(z) < 2.0 * high:
-                return feature.name
-        return None
 
     def set_unit(self, unit: str) -> None:
         """The scan's coordinates are in another unit; only as long as there are no ridges."""
@@ -269,6 +254,7 @@ class Page:
         self.sizes.tell(feature)
         low, high = feature.between or (0.0, ridge.length)
         tell.stretch = "" if feature.between is None else f"s = {number(low)} to {number(high)} {ridge.unit}"
+        tell.earlier = feature.before is not None
         tell.profile = curves.profile(ridge, feature.between)
         tell.rows = [{"name": name, "value": value} for name, value in self._rows(feature)]
         self.pointing.show(feature, self.pointing.place(feature))

@@ -6,7 +6,6 @@ import asyncio
 import os
 import secrets
 import tempfile
-import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -33,7 +32,6 @@ def serve(
     port: int = 0,
     upload: int = UPLOAD,
     ready: Callable[[str], None] = print,
-    open_browser: bool = True,
 ) -> None:
     """Serve the page until it is interrupted.
 
@@ -68,21 +66,12 @@ def serve(
 
         async def begun(**_: Any) -> None:
             asyncio.get_running_loop().set_exception_handler(_unless_gone)
-            opening = asyncio.ensure_future(_opened(work, scan, unit))
-            # What is soon found to be no scan is told before there is a page.
-            await asyncio.wait({opening}, timeout=_SOON)
-            if not opening.done() or not opening.exception():
-                address = f"http://{host}:{server.port}/?token={token}"
-                ready(address)
-                if open_browser:
-                    webbrowser.open(address)
             try:
-                await opening
+                await _opened(work, scan, unit, lambda: ready(f"http://{host}:{server.port}/?token={token}"))
+                await work.warm()
             except (ValueError, OSError) as error:
                 wrong.append(error)
                 await server.stop()
-                return
-            await work.warm()
 
         server.controller.on_server_bind.add(bind)
         server.controller.on_server_ready.add_task(begun)
@@ -98,9 +87,16 @@ def serve(
         raise wrong[0]
 
 
-async def _opened(work: Work, scan: Path | None, unit: str | None) -> None:
-    if scan is not None:
-        await work.open(scan, scan.name, unit)
+async def _opened(work: Work, scan: Path | None, unit: str | None, show: Callable[[], None]) -> None:
+    """Open the first scan, and show the page; what is soon found to be no scan has none shown."""
+    if scan is None:
+        show()
+        return
+    opening = asyncio.ensure_future(work.open(scan, scan.name, unit))
+    await asyncio.wait({opening}, timeout=_SOON)
+    if not opening.done() or not opening.exception():
+        show()
+    await opening
 
 
 def _markup(server: Any, scene: Scene, files: list[str]) -> Any:

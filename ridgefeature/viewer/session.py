@@ -6,10 +6,17 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ridgefeature.curvilinear import local_coordinates
 from ridgefeature.ridge import Ridge
 
+Array = NDArray[np.float64]
 LEAST, MOST = 0.2, 3.0
 """Rates of height and width that sliders reach."""
+_ON = 0.4
+"""Distance from a spine, in widths, up to which a place is on its ridge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +67,18 @@ class Session:
             f"ridge: expected one of {', '.join(f.name for f in self.features) or 'none'}, got {name!r}; "
             "choose one of them"
         )
+
+    def at(self, place: Array) -> str | None:
+        """The name of a ridge that is shown and has this place (3,) of the scan between its feet."""
+        for feature in reversed(self.features):
+            ridge = feature.registered
+            s, y, z = (float(x[0]) for x in local_coordinates(ridge, place[None]))
+            half, high = (
+                float(np.interp(s, ridge.arc_length, np.abs(x))) for x in (ridge.width, ridge.height)
+            )
+            if feature.shown and 0.0 <= s <= ridge.length and abs(y) < _ON * half and abs(z) < 2.0 * high:
+                return feature.name
+        return None
 
     def added(self, registered: Ridge, pick: tuple[float, float, float]) -> Session:
         """With one more ridge, chosen, by the first free name."""

@@ -56,7 +56,7 @@ def _macro(feature: Feature, scan: Scan | None, path: Path) -> None:
 def _profile(feature: Feature, scan: Scan | None, path: Path) -> None:
     from ridgefeature import plot
 
-    plot.profile(feature.ridge, path, scan)
+    plot.profile(feature.ridge, path, scan, feature.registered)
 
 
 def _view(feature: Feature, scan: Scan | None, path: Path) -> None:

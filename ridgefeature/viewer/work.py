@@ -102,7 +102,7 @@ class Work:
         if place is None:
             page.say("There is no scan point here; click on the scan.", bad=True)
             return
-        here = page.ridge_at(place)
+        here = page.session.at(place)
         if here is not None:
             page.choose(here)
             page.say(f"This is {here}. To register it anew, remove it first.")
