@@ -34,6 +34,12 @@ def test_the_spiral_is_clicked_made_higher_and_taken_away(tmp_path: Path) -> Non
         ready(page, "spiral.npy")
         before = float(page.locator("#height").input_value())
         width = float(page.locator("#width").input_value())
+        page.fill("#height", "1000")
+        page.keyboard.press("Tab")
+        page.wait_for_selector("#hint.bad")
+        assert page.locator("#hint").inner_text().startswith("height: expected")
+        page.wait_for_timeout(300)
+        assert page.locator("#hint.bad").count() == 1, "until something goes right"
         set_slider(page, "h", 1.5)
         page.wait_for_function(f"() => document.querySelector('#height').value > {1.49 * before}")
         assert float(page.locator("#width").input_value()) == width
@@ -58,29 +64,25 @@ def test_two_ridges_by_mouse_and_keys(tmp_path: Path) -> None:
     np.save(tmp_path / "two.npy", points)
     with served(tmp_path, "two.npy") as address, opened(address) as page:
         ready(page, "two.npy")
-        places = [place_on(page, points, (30.0, y, 3.0)) for y in (0.0, 50.0)]
-        page.mouse.click(*places[0])
+        page.mouse.click(*place_on(page, points, (30.0, 0.0, 3.0)))
         page.wait_for_selector(".ridge >> nth=0")
         ready(page, "two.npy")
-        # The curves have taken some of the view: the second place is fitted to the middle by keys.
         page.focus("#view")
-        for _ in range(3):
-            page.keyboard.press("+")
-        for key in ("Shift+ArrowUp", "Shift+ArrowLeft", "f"):
+        for key in ("+", "+", "Shift+ArrowUp", "Shift+ArrowLeft", "f", "d"):
             page.keyboard.press(key)
-        for _ in range(12):
-            page.keyboard.press("Shift+ArrowUp")
-            page.keyboard.press("Enter")
-            page.wait_for_timeout(400)
-            if page.locator(".ridge").count() == 2:
-                break
-        assert page.locator(".ridge").count() == 2
+        page.wait_for_selector("#shell.dark")  # by then all keys before it are done
+        page.mouse.click(*place_on(page, points, (30.0, 50.0, 3.0)))
+        page.wait_for_selector(".ridge >> nth=1")
         ready(page, "two.npy")
         assert page.locator(".ridge.chosen").inner_text().startswith("ridge 2")
         page.click("[aria-label='Show ridge 1']")
         page.click("[aria-label='Rename ridge 2']")
-        page.fill("[aria-label='New name of ridge 2']", "seam")
-        page.keyboard.press("Tab")
+        page.keyboard.press("Escape")
+        page.wait_for_selector("[aria-label='New name of ridge 2']", state="detached")
+        page.click("[aria-label='Rename ridge 2']")
+        page.wait_for_selector("[aria-label='New name of ridge 2']:focus")
+        page.keyboard.type("seam")
+        page.keyboard.press("Enter")
         page.wait_for_selector("[aria-label='Rename seam']")
         page.click("[aria-label='Remove ridge 1']")
         page.wait_for_function("() => document.querySelectorAll('.ridge').length === 1")
@@ -90,11 +92,11 @@ def test_two_ridges_by_mouse_and_keys(tmp_path: Path) -> None:
 
 
 def test_a_march_is_stopped_in_the_middle(tmp_path: Path) -> None:
-    write_scan(tmp_path, 200_000, 3000.0)
+    write_scan(tmp_path, 400_000, 12_000.0)
     with served(tmp_path, "clay.npy") as address, opened(address) as page:
         ready(page, "clay.npy")
         page.focus("#view")
-        for _ in range(20):
+        for _ in range(30):
             page.keyboard.press("+")  # the ridge runs through the middle
         page.keyboard.press("Enter")
         page.wait_for_function(

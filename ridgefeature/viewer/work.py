@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ridgefeature.diagnosis import diagnose
 from ridgefeature.io.colours import Pixels, colours_at
 from ridgefeature.io.read import FORMATS, read_scan
+from ridgefeature.march import INTERRUPTED
 from ridgefeature.readable import reason
 from ridgefeature.registration import NoRidgeError, register
 from ridgefeature.ridge import Ridge
@@ -145,7 +146,8 @@ class Work:
         page = self.page
         await aside(lambda: page.pointing.points_near(ridge))
         page.do(page.session.added(ridge, march.at))
-        stopped = " It was stopped: what was found is kept." if march.stopped else ""
+        early = march.stopped and INTERRUPTED in ridge.stop
+        stopped = " It was stopped: what was found is kept." if early else ""
         page.say(f"{page.session.chosen}: {len(ridge.templates)} templates.{stopped} {HINT}")
         await self._diagnose(ridge)
         page.refresh()

@@ -81,6 +81,9 @@
     if (!on(e, "input, select, textarea") && anywhere[e.key]) tell(...anywhere[e.key]);
   }, true);
 
+  // A name that is to be another is there to be typed over.
+  document.addEventListener("focusin", (e) => { if (e.target.id === "new-name") setTimeout(() => e.target.select()); });
+
   // Files: dropped on the page, or chosen.
   const send = async (file) => {
     if (!file) return;
