@@ -32,6 +32,8 @@ ACROSS = 4e-6
 """How far feet and flanks may leave the base between columns, in least widths."""
 _BESIDE = 100.0
 """How many times that they may lie beside their place, within the base."""
+_NARROW = LEAST_BORDER - 0.5
+"""Breadth of the narrowest flank, in widths."""
 _MOST_ROWS = 1601
 _MOST_SPLITS = 16
 
@@ -209,6 +211,17 @@ def _octave(breadth: float) -> float:
     power is near enough for positions to run evenly over the flank, and never so large that they turn back.
     """
     return float(2.0 ** np.floor(np.log2(breadth * np.sqrt(2))))
+
+
+def knot_changes(stations: Stations, least: float, most: float) -> Array:
+    """Rates of the width between `least` and `most`, ascending, at which the knots across change.
+
+    Up to and with each of them the knots are the same, for stations on one curved base.
+    """
+    broad = float((stations.border / stations.width).min())
+    octaves = np.arange(np.floor(np.log2(broad / least)) + 2, np.floor(np.log2(_NARROW)) - 1, -1)
+    rates = broad / (0.5 + 2.0 ** (octaves - 0.5))
+    return np.asarray(rates[(rates > least) & (rates < most)])
 
 
 def _columns(base: Base, s: Array, border: Array, section: Section, flank: float) -> tuple[Array, float]:

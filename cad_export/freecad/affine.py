@@ -33,6 +33,11 @@ class AffinePoles:
         return self.fixed + h * self.per_height + w * self.per_width
 
 
+def largest_width(ridge: Ridge) -> float:
+    """The largest rate of the width that leaves the feet on the flanks."""
+    return float((ridge.border / LEAST_BORDER / ridge.width).min())
+
+
 def affine_poles(ridge: Ridge) -> AffinePoles:
     """The ridge's poles taken apart, from its own surface at a few rates, and held against it at others.
 
@@ -40,14 +45,8 @@ def affine_poles(ridge: Ridge) -> AffinePoles:
     """
     flat = ridge.resized(h=0, w=1).surface().poles
     slim = ridge.resized(h=0, w=0.5).surface().poles
-    if slim.shape != flat.shape:
-        raise ValueError(
-            f"expected poles that are affine in h and w, got {flat.shape[1]} across at w=1 and "
-            f"{slim.shape[1]} at w=0.5: the ridge stands on a curved base; export the surface at fixed "
-            "rates instead"
-        )
     per_width = 2 * (flat - slim)
-    largest = float((ridge.border / LEAST_BORDER / ridge.width).min())
+    largest = largest_width(ridge)
     poles = AffinePoles(flat - per_width, ridge.surface().poles - flat, per_width, largest)
     allowed = TOLERANCE * float(np.abs(poles.fixed).max())
     for h, w in ((1.0, 1.0), (-1.5, 0.25), (3.0, largest * (1 - TOLERANCE))):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from cad_export.freecad.affine import affine_poles
+from cad_export.freecad.curved import curved_surface
 from ridgefeature import Ridge
 from ridgefeature.io.feature import to_document
 from ridgefeature.scan import millimetres_per
@@ -26,7 +27,9 @@ def write_macro(ridge: Ridge, path: str | os.PathLike[str]) -> Path:
     The macro needs FreeCAD alone. Its object, a Part::FeaturePython, has the rates Height and Width as
     properties (1 = as registered) and makes its B-spline face from them again, in millimetres; it refuses
     the rates that `ridge.resized` refuses. The macro also carries the feature as JSON. Every number is exact
-    to the last bit; the poles are combined in the macro, exact to 1e-12 of the largest coordinate.
+    to the last bit; the poles are combined in the macro, exact to 1e-12 of the largest coordinate. On a base
+    that is curved across they are not affine in the width: the macro makes them with numpy, which FreeCAD
+    brings, and takes rates of the width from 0.05 on.
     The file is written beside the path and renamed.
     Raises ValueError for something that is no Ridge or a name that does not end in .FCMacro, OSError where
     the file cannot be written.
@@ -62,14 +65,18 @@ def _literal(ridge: Ridge) -> str:
 
 
 def _surface(ridge: Ridge) -> str:
-    """The surface as JSON, one row of poles a line: x, y, z of each pole in millimetres."""
-    surface, poles, factor = ridge.surface(), affine_poles(ridge), millimetres_per(ridge.unit)
-    entries: dict[str, Any] = {"largest_width": poles.largest_width}
+    """The surface as JSON: for a flat base one row of poles a line, x, y, z of each pole in millimetres."""
+    surface = ridge.surface()
+    entries: dict[str, Any] = {}
     for name in "uv":
         knots, counts = np.unique(getattr(surface, f"knots_{name}"), return_counts=True)
         entries[f"degree_{name}"] = getattr(surface, f"degree_{name}")
         entries[f"knots_{name}"] = knots.tolist()
         entries[f"multiplicities_{name}"] = counts.tolist()
+    if ridge.curvature.any():
+        return json.dumps(entries | curved_surface(ridge), indent=1)
+    poles, factor = affine_poles(ridge), millimetres_per(ridge.unit)
+    entries["largest_width"] = poles.largest_width
     lines = [f'"{name}": {json.dumps(value)}' for name, value in entries.items()]
     for name in ("fixed", "per_height", "per_width"):
         rows = (factor * getattr(poles, name)).reshape(len(poles.fixed), -1).tolist()
