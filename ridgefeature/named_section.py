@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 _WIDTHS = np.exp(np.linspace(-0.25, 0.25, 21))
 """Widths that are looked at, in that which keeps the width at half height."""
+_UNTOLD = 1.0, 0.0, 0.0, 0.0, 0.0
 _UNKNOWN = 2
 """Height and place, beside the changes of the base."""
 
@@ -62,7 +63,11 @@ def _fitted(
     columns = _columns(before, section, spans, wider)
     across = columns.transpose(0, 2, 1)
     normal, pull = across @ matrix @ columns, across @ right
-    found = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
+    try:
+        found = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:  # too few points to tell of this one
+        found = np.tile(_UNTOLD, (len(pull), 1))
+        pull = 0.0 * found
     loss = -(found * pull).sum(axis=1)
     k = int(np.argmin(loss))
     found[k, 1] /= found[k, 0]

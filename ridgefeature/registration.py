@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ridgefeature.alternatives import distinct
-from ridgefeature.asked import hints_of, positive, refusal, settings_of, text_of, vector_of, warned
+from ridgefeature.asked import hints_of, positive, settings_of, text_of, vector_of, warned
+from ridgefeature.attempts import NoRidgeError, RefusedError, ridge_meant
 from ridgefeature.distance import sampling_floor
 from ridgefeature.ends import place_ends
 from ridgefeature.follows import told_ends
@@ -25,7 +25,7 @@ from ridgefeature.rings import CLOSED, ring_or_not
 from ridgefeature.scan import Scan, as_scan
 from ridgefeature.settings import Settings
 from ridgefeature.settle import finish_ends, settle, settle_base
-from ridgefeature.starts import LADDER, Hints
+from ridgefeature.starts import Hints
 from ridgefeature.stations import lay_out
 from ridgefeature.template import STEEP, Template
 from ridgefeature.valley import fitted_over_ground
@@ -38,25 +38,9 @@ _STANDS_OUT = 0.5
 _ADVICE = "pick a point on the ridge, or give direction=, width= and height= as a start"
 _ROUGH_POINTS = 400
 _NEAR = 100
-_NARROWER = 6
-"""Steps of the ladder of widths by which narrower ridges are looked for on what is too large for one."""
-_OTHER_WIDTHS = -1, 1, -2, 2, -3, 3
-"""Steps of it from the width of what was refused, at which a ridge is looked for at last."""
 _CLUSTERED = 1.6
 """What a spacing by density is, in the median distance to the nearest point, where points lie in clusters or
 lines; on an even surface it is 0.5 (grids) to 1.25."""
-
-
-class NoRidgeError(ValueError):
-    """There is no ridge at the picked point."""
-
-
-class _RefusedError(NoRidgeError):
-    """What was found there is none, perhaps for its size; it began with a template of this width."""
-
-    def __init__(self, message: str, width: float, too_large: bool = False) -> None:
-        super().__init__(message)
-        self.width, self.too_large = width, too_large
 
 
 def register(
@@ -94,7 +78,12 @@ def register(
     _check_pick(grid, pick, spacing, extent)
     full = Window(grid, spacing)
     rough = full.thinned(_ROUGH_POINTS)
-    return warned(_tried(rough, full, pick, extent, hints, settings, progress, scan), pick, direction)
+
+    def attempt(hints: Hints, reach: float, aimed: bool = True, high: bool = False) -> Ridge:
+        track = _track(rough, full, pick, extent, hints, settings, progress, reach, aimed, high)
+        return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
+
+    return warned(ridge_meant(attempt, extent, hints), pick, direction)
 
 
 def _constructed(
@@ -117,7 +106,7 @@ def _constructed(
             or fin(stations.height, median(stations.width), settings)
         )
         if why:
-            raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", track.templates[0].width)
+            raise RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", track.templates[0].width)
     return Ridge(
         **vars(stations),
         section=section,
@@ -130,45 +119,6 @@ def _constructed(
         settings=settings,
         source=scan.source,
     )
-
-
-def _tried(
-    rough: Window,
-    full: Window,
-    pick: Array,
-    extent: float,
-    hints: Hints,
-    settings: Settings,
-    progress: Progress | None,
-    scan: Scan,
-) -> Ridge:
-    """The ridge that lies nearest to the pick; else what explains most about it; else what rises on steep
-    flanks, which look like ridges themselves; else what is narrower than what was found, if that is no ridge
-    for its size: a body that bears ridges explains far more; else what begins with some other width."""
-
-    def tried(reach: float, aimed: bool = True, high: bool = False) -> Ridge:
-        track = _track(rough, full, pick, extent, hints, settings, progress, reach, aimed, high)
-        return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
-
-    with suppress(NoRidgeError):
-        return tried(extent)
-    try:
-        return tried(extent, aimed=False)
-    except NoRidgeError as found:
-        refused = found
-    with suppress(NoRidgeError):
-        return tried(extent, high=True)
-    if not isinstance(refused, _RefusedError) or hints.width is not None:
-        raise NoRidgeError(refusal(str(refused), hints)) from None
-    if refused.too_large:
-        for n in range(_NARROWER):
-            with suppress(NoRidgeError):
-                return tried(refused.width / LADDER ** (n + 1))
-    for step in _OTHER_WIDTHS:
-        hints = replace(hints, width=refused.width * LADDER**step)
-        with suppress(NoRidgeError):
-            return tried(extent)
-    raise NoRidgeError(refusal(str(refused), hints)) from None
 
 
 def _track(
@@ -203,10 +153,10 @@ def _track(
     track = finish_ends(full, track, settings)
     why = too_large(track, extent, settings)
     if why:
-        raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width, True)
+        raise RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width, True)
     why = no_ridge(rough, track, pick, settings)
     if why:
-        raise _RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width)
+        raise RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width)
     settled = settings.measure == "M" or (
         track.misfit is not None and not in_doubt(track.misfit, track.templates)
     )

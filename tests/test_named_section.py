@@ -65,3 +65,12 @@ def test_another_named_section_is_taken_before_a_free_one():
     section, found = shaped(scan("dome"), terms(width), seen, NOISE, 1.0)
     assert section.name == "dome"
     assert found[:, W] == pytest.approx(WIDTH, rel=0.03)
+
+
+def test_where_no_points_tell_of_it_the_section_stays():
+    before = SECTIONS["bell"]()
+    n = SPANS + 6
+    own, best = best_named(np.zeros((n, n)), np.zeros(n), before, SPANS, WIDER)
+    assert best is own and own.section is before and own.loss == 0
+    terms = np.ones((4, TERMS))
+    np.testing.assert_array_equal(own.applied(terms)[:, [A, H]], terms[:, [A, H]])
