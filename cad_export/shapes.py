@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cadquery as cq
 import numpy as np
 from OCP.BRep import BRep_Tool
@@ -15,16 +17,21 @@ from cad_export.occt_arrays import pole_array
 from cad_export.record import record_of
 from cad_export.slab import make_slab
 from ridgefeature.bspline import Surface
+from ridgefeature.scan import millimetres_per
 
 
-def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1) -> cq.Face:
+def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1, unit: str | None = None) -> cq.Face:
     """One face with the exact poles and knots of ridge.resized(h=h, w=w).surface(), or of a Surface.
 
-    In the frame and unit of the ridge; natural bounds; its normal is du x dv. Raises ValueError for anything
-    that is neither, and for rates of a plain Surface; warns where a ridge's surface folds over itself. The
-    face carries the feature (`carried_by`).
+    In the frame of the ridge and in its unit, or another one such as "mm"; natural bounds; its normal is
+    du x dv. Raises ValueError for anything that is neither, for rates of a plain Surface and for an unknown
+    unit; warns where a ridge's surface folds over itself. The face carries the feature (`carried_by`).
     """
-    made = make_face(checked_surface(ridge, h, w))
+    surface = checked_surface(ridge, h, w)
+    if unit is not None:
+        factor = millimetres_per(getattr(ridge, "unit", unit)) / millimetres_per(unit)
+        surface = surface if factor == 1 else replace(surface, poles=factor * surface.poles)
+    made = make_face(surface)
     attach(made, record_of(ridge, h, w))
     return cq.Face(made)
 

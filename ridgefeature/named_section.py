@@ -64,10 +64,9 @@ def _fitted(
     across = columns.transpose(0, 2, 1)
     normal, pull = across @ matrix @ columns, across @ right
     try:
-        found = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
+        found = np.asarray(np.linalg.solve(normal, pull[:, :, None]), dtype=np.float64)[:, :, 0]
     except np.linalg.LinAlgError:  # too few points to tell of this one
-        found = np.tile(_UNTOLD, (len(pull), 1))
-        pull = 0.0 * found
+        return NamedSection(section, 0.0, 1.0, np.array(_UNTOLD))
     loss = -(found * pull).sum(axis=1)
     k = int(np.argmin(loss))
     found[k, 1] /= found[k, 0]

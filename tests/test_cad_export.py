@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import spiral_ridge
 from surfaces import FakeRidge, ridge_surface, ring
 
 import cad_export as cx
@@ -48,6 +49,17 @@ def test_a_face_of_a_ridge_takes_its_rates() -> None:
     for h, w in ((1, 1), (2, 0.5)):
         got = cx.surface_of(cx.face(FakeRidge(), h=h, w=w))
         np.testing.assert_array_equal(got.poles, ridge_surface(1.5 * h, 2.0 * w).poles)
+
+
+def test_a_face_is_made_in_another_unit_on_request() -> None:
+    ridge = dataclasses.replace(spiral_ridge(), unit="cm")
+    face = cx.face(ridge, h=1.5, unit="mm")
+    np.testing.assert_allclose(cx.surface_of(face).poles, 10 * ridge.resized(h=1.5).surface().poles)
+    [(_, record)] = cx.carried_by(face)
+    assert record.h == 1.5 and record.feature["unit"] == "cm"
+    assert np.array_equal(cx.surface_of(cx.face(ridge)).poles, ridge.surface().poles)
+    with pytest.raises(ValueError, match="expected a length unit"):
+        cx.face(ridge, unit="parsec")
 
 
 def test_a_moved_face_gives_poles_in_its_place() -> None:

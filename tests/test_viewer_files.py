@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_ridges import made_ridge
-from page_ridges import PICK, registered, scan
+from page_ridges import LENGTH, PICK, registered, scan
 
 from ridgefeature.viewer import curves, saved, takeaway
 from ridgefeature.viewer.session import Feature, Session
@@ -129,9 +129,14 @@ def test_the_script_regenerates_the_ridge_at_what_stands_at_its_top(tmp_path: Pa
     text = file.read_text()
     assert "h = 1.5 " in text and "w = 0.8\n" in text
     runpy.run_path(str(file))
+    import cadquery as cq
+
     import cad_export as cx
 
     assert np.allclose(cx.load(tmp_path / "ridge-1.step").height, feature.ridge.height)
+    own = takeaway.write("step", feature, None, tmp_path.parent)
+    sizes = [cq.importers.importStep(str(p)).val().BoundingBox() for p in (tmp_path / "ridge-1.step", own)]
+    assert sizes[0].xlen == pytest.approx(sizes[1].xlen) == pytest.approx(10.0 * LENGTH, rel=0.1)
     file.write_text(text.replace("h = 1.5 ", "h = 2.0 "))
     runpy.run_path(str(file))
     taller = feature.registered.resized(h=2.0, w=0.8, between=(10.0, 40.0))

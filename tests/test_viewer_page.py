@@ -207,6 +207,19 @@ def test_a_stretch_is_chosen_by_keys(found: Page) -> None:
     assert found.feature.between == pytest.approx((0.8 * length, length)), "one beyond the other"
 
 
+def test_a_ridge_that_is_found_a_second_time_is_chosen(work: Work, found: Page) -> None:
+    found.choose("ridge 1")
+    assert work.march is None
+    asyncio.run(work._add(registered(), March(scan(), (30.0, 0.0, HEIGHT))))
+    assert len(found.session.features) == 1 and found.tell.hint.startswith("This is ridge 1 again")
+
+
+def test_a_pick_that_is_not_on_what_was_found_is_told(work: Work) -> None:
+    far = replace(registered(), pick=np.array([30.0, 18.0, 0.0]))
+    asyncio.run(work._add(far, March(scan(), (30.0, 18.0, 0.0))))
+    assert "The pick lies 18" in work.page.tell.hint and "cm from it" in work.page.tell.hint
+
+
 def test_a_click_on_a_ridge_that_is_known_chooses_it(work: Work, found: Page) -> None:
     found.do(found.session.added(registered().resized(h=-1.0), PICK))
     found.toggle("groove 1")
@@ -256,8 +269,29 @@ def test_what_is_wrong_with_a_value_stays_told_as_the_page_comes_to_rest(work: W
         found.sizes.edited({**found.sizes.fields, field: value})
         ask["rest"]()
         assert found.tell.bad and found.tell.hint.startswith(told)
-    ask["reset"]()
-    assert not found.tell.bad
+    found.sizes.edited({**found.sizes.fields, "h": 1.2})
+    assert not found.tell.bad and found.tell.h == 1.2, "until something goes right"
+
+
+def test_a_largest_value_is_met_in_a_stretch_and_room_is_told_as_it_is(found: Page) -> None:
+    assert found.feature is not None
+    found.sizes.stretch(*(curves.part_of(s, registered().length) for s in (10.0, 24.0)))
+    wavy = registered().resized(height=lambda s: HEIGHT * (1 + 0.2 * np.cos(s)))
+    found.do(Session().added(wavy, PICK))
+    found.sizes.stretch(*(curves.part_of(s, wavy.length) for s in (10.0, 24.0)))
+    found.sizes.absolute("height", 2 * HEIGHT)
+    ridge = found.feature.ridge
+    inside = (ridge.arc_length >= 10) & (ridge.arc_length <= 24)
+    assert ridge.height[inside].max() == pytest.approx(2 * HEIGHT, rel=1e-9)
+    found.sizes.whole()
+    for _ in range(2):
+        found.sizes.slide("w", found.tell.most_w)
+        with pytest.raises(ValueError, match="width: expected ") as told:
+            found.sizes.absolute("width", 1e3)
+        most = float(str(told.value).split(" to ")[1].split()[0])
+        found.sizes.absolute("width", most)
+        assert float(found.tell.width) == pytest.approx(most, rel=2e-3)
+        found.sizes.stretch(*(curves.part_of(s, wavy.length) for s in (10.0, 24.0)))
 
 
 def test_curves_and_view_point_at_the_same_place(found: Page) -> None:

@@ -77,6 +77,9 @@ def test_a_part_hides_the_scan_is_picked_and_leaves_it_as_it_was(scene: Scene) -
     scene.look_at_part(points, np.array([[1, 3, 2]]))
     scene.window.Render()
     assert not scene._actors["still"].GetVisibility()
+    for moving in (True, False):
+        scene.coarse(moving)
+        assert not any(scene._actors[name].GetVisibility() for name in ("still", "moving"))
     found = scene.pick_part(*scene.on_screen(np.array([7.0, 7.0, 5.0])))
     assert found == pytest.approx([7, 7, 5], abs=1e-3)
     scene.hide("part")

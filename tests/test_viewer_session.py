@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_ridges import made_ridge
 
-from ridgefeature.viewer.session import History, Session
+from ridgefeature.viewer.session import PAUSE, History, Session
 
 PICK = (0.0, 0.0, 0.0)
 
@@ -48,7 +50,7 @@ def test_names_are_free_or_refused(session: Session) -> None:
     assert renamed.chosen == "seam" and renamed["seam"].ridge.groove
     assert session.renamed("groove 1", "groove 1").chosen == "groove 1"
     for name in ("", "  ", "ridge 1"):
-        with pytest.raises(ValueError, match="name: expected one that no other ridge has"):
+        with pytest.raises(ValueError, match="name: expected one"):
             session.renamed("groove 1", name)
     with pytest.raises(ValueError, match="expected one of ridge 1, groove 1, got 'x'"):
         session.choosing("x")
@@ -73,6 +75,29 @@ def test_undo_and_redo_go_back_and_forth(session: Session) -> None:
     history.redo()
     history.do(one.changed("ridge 1", h=2.0))
     assert not history.redo(), "what is done anew has nothing after it"
+
+
+def test_values_that_are_typed_one_after_the_other_are_steps_of_their_own(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    history, seconds = History(session), iter([10.0, 14.0, 14.0 + 0.5 * PAUSE, 30.0])
+    monkeypatch.setattr("ridgefeature.viewer.session.time.monotonic", lambda: next(seconds))
+    for h in (1.5, 2.0, 2.1, 0.5):
+        history.do(history.now.changed("ridge 1", h=h), "h of ridge 1")
+    found = []
+    while history.undo():
+        found.append(history.now["ridge 1"].h)
+    assert found == [2.1, 1.5, 1.0]
+
+
+def test_a_ridge_that_was_found_before_is_known_by_its_path(session: Session) -> None:
+    ridge = made_ridge()
+    assert session.without("groove 1").again(ridge) == "ridge 1"
+    assert session.without("groove 1").again(ridge.stretched(0.6 * ridge.length, "trim")) == "ridge 1"
+    aside = replace(ridge, spine=ridge.spine + 2.0 * ridge.width.max() * ridge.across)
+    assert session.again(aside) is None
+    assert session.without("groove 1").changed("ridge 1", shown=False).again(ridge) is None
+    assert Session().again(ridge) is None
 
 
 def test_a_slider_is_one_step(session: Session) -> None:

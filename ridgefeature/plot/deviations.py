@@ -51,7 +51,7 @@ def deviation(
     found = diagnose(ridge, scan) if diagnosis is None else diagnosis
     figure = new_figure(*_SIZE)
     grid = figure.add_gridspec(
-        4, 1, height_ratios=[2.4, 1, 1, 1], hspace=0.12, left=0.06, right=0.7, top=0.9, bottom=0.065
+        4, 1, height_ratios=[2.4, 1, 1, 1], hspace=0.12, left=0.075, right=0.7, top=0.9, bottom=0.065
     )
     panels = [figure.add_subplot(grid[0])]
     panels += [figure.add_subplot(grid[i], sharex=panels[0]) for i in (1, 2, 3)]
@@ -67,7 +67,7 @@ def deviation(
     panels[-1].set_xlabel(f"arc length s [{ridge.unit}]")
     _figures(figure, ridge, found)
     name = "" if ridge.source is None else f" in {ridge.source.name}"
-    figure.suptitle(f"Where to trust the ridge{name}", x=0.06, ha="left", weight="bold", fontsize=14)
+    figure.suptitle(f"Where to trust the ridge{name}", x=0.075, ha="left", weight="bold", fontsize=14)
     save(figure, path)
     return figure
 

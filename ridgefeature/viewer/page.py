@@ -32,9 +32,9 @@ TOLD: dict[str, Any] = {
     "scan_name": "", "scan_note": "", "unit": "mm", "hint": "", "bad": False, "busy": "", "count": 0,
     "ridges": [], "chosen": "", "h": 1.0, "w": 1.0, "rows": [], "profile": "", "section": "", "place": -1.0,
     "stretch": "", "can_undo": False, "can_redo": False, "colouring": "height", "dark": False,
-    "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "height": "",
-    "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane", "part_note": "",
-    "host_name": "", "coloured": False, "earlier": False,
+    "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "most_w": MOST,
+    "height": "", "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane",
+    "part_note": "", "host_name": "", "coloured": False, "earlier": False,
 }  # fmt: skip
 """What the page knows, and how it begins."""
 
@@ -222,6 +222,11 @@ class Page:
     def say(self, text: str, bad: bool = False) -> None:
         self.tell.hint, self.tell.bad = text, bad
 
+    def right(self) -> None:
+        """Something went right: what was wrong before is told no more."""
+        if self.tell.bad:
+            self.say("" if self.tell.pasting else HINT)
+
     def refresh(self) -> None:
         """Show the session as it is: ridges, sliders, curves, table."""
         session, tell = self.session, self.tell
@@ -258,6 +263,8 @@ class Page:
         tell.profile = curves.profile(ridge, feature.between)
         tell.rows = [{"name": name, "value": value} for name, value in self._rows(feature)]
         self.pointing.show(feature, self.pointing.place(feature))
+        if not feature.shown:
+            self.scene.mark(None, "place")
 
     def _rows(self, feature: Feature) -> list[tuple[str, str]]:
         ridge, unit = feature.ridge, feature.ridge.unit

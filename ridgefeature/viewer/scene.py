@@ -62,6 +62,7 @@ class Scene:
         """(m, 3) those points of the scan that are drawn at rest."""
         self._actors: dict[str, vtkActor] = {}
         self._camera: vtkCamera | None = None
+        self._only_part = False
         self.faint = False
         """Whether ridges let the points' colours through."""
         self.interactor.AddObserver("StartInteractionEvent", lambda *_: self.coarse(True))
@@ -169,6 +170,7 @@ class Scene:
 
     def only_part(self, only: bool) -> None:
         """Show nothing but the solid, or all but it."""
+        self._only_part = only
         for name, actor in self._actors.items():
             actor.SetVisibility(name.startswith("part") == only)
         if not only:
@@ -271,7 +273,7 @@ class Scene:
         """Draw few points, as long as something moves, or all."""
         for name, shown in (("still", not moving), ("moving", moving)):
             if name in self._actors:
-                self._actors[name].SetVisibility(shown)
+                self._actors[name].SetVisibility(shown and not self._only_part)
 
     def _line(self, name: str, places: Array, colour: tuple[float, float, float], width: float) -> None:
         look = self._show(name, line(places)).GetProperty()

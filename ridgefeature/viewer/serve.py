@@ -12,7 +12,7 @@ from typing import Any
 
 from ridgefeature.scan import MILLIMETRES
 from ridgefeature.viewer.guard import LOOPBACK, add_headers, guard
-from ridgefeature.viewer.page import HINT, TOLD, Page
+from ridgefeature.viewer.page import TOLD, Page
 from ridgefeature.viewer.routes import routes
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.sizes import FIELDS
@@ -176,8 +176,8 @@ def _told(page: Page, what: Callable[..., None], *values: Any) -> None:
     except (ValueError, TypeError, KeyError) as error:
         page.say(str(error), bad=True)
     else:
-        if wrong and page.tell.bad and what not in (page.hover, page.away, page.point, page.rest):
-            page.say("" if page.tell.pasting else HINT)
+        if wrong and what not in (page.hover, page.away, page.point, page.rest):
+            page.right()
 
 
 async def _reported(page: Page, what: Callable[..., Any], *values: Any) -> None:

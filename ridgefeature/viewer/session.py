@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
@@ -15,6 +18,10 @@ from ridgefeature.ridge import Ridge
 Array = NDArray[np.float64]
 LEAST, MOST = 0.2, 3.0
 """Rates of height and width that sliders reach."""
+_PLACES, _MOST_OF_IT = 20, 0.8
+"""Places of a ridge that are looked at, and the share of them that lie on another where that is the same."""
+PAUSE = 1.0
+"""Seconds."""
 _ON = 0.4
 """Distance from a spine, in widths, up to which a place is on its ridge."""
 
@@ -80,6 +87,13 @@ class Session:
                 return feature.name
         return None
 
+    def again(self, ridge: Ridge) -> str | None:
+        """The name of a ridge that is shown and runs along most of this one: it was found a second time."""
+        middles = ridge.spine + 0.5 * ridge.height[:, None] * ridge.normal
+        at = np.linspace(0, len(middles) - 1, _PLACES + 2).astype(int)[1:-1]
+        name, count = Counter(self.at(place) for place in middles[at]).most_common(1)[0]
+        return name if count > _MOST_OF_IT * _PLACES else None
+
     def added(self, registered: Ridge, pick: tuple[float, float, float]) -> Session:
         """With one more ridge, chosen, by the first free name."""
         taken = {f.name for f in self.features}
@@ -90,9 +104,11 @@ class Session:
     def changed(self, name: str, /, **values: object) -> Session:
         """With other values of one ridge. Raises ValueError where a rate is out of reach, or of room."""
         for rate in ("h", "w"):
-            if rate in values and not LEAST <= float(str(values[rate])) <= MOST:
+            value = float(str(values.get(rate, 1.0)))
+            if not LEAST <= value <= MOST:
+                got = "no number" if math.isnan(value) else f"{value:g}"
                 raise ValueError(
-                    f"{rate}: expected a rate from {LEAST:g} to {MOST:g}, got {values[rate]}; give another"
+                    f"{rate}: expected a rate from {LEAST:g} to {MOST:g}, got {got}; give another"
                 )
         return self._with(name, replace(self[name], **values))  # type: ignore[arg-type]
 
@@ -107,7 +123,9 @@ class Session:
     def renamed(self, name: str, to: str) -> Session:
         """With another name for one ridge. Raises ValueError where it is empty or taken."""
         to = to.strip()
-        if not to or (to != name and any(f.name == to for f in self.features)):
+        if not to:
+            raise ValueError("name: expected one, got none; give another")
+        if to != name and any(f.name == to for f in self.features):
             raise ValueError(f"name: expected one that no other ridge has, got {to!r}; give another")
         changed = self.changed(name, name=to)
         return replace(changed, chosen=to if self.chosen == name else self.chosen)
@@ -127,18 +145,21 @@ class Session:
 
 @dataclass
 class History:
-    """Sessions before and after the one at hand. Steps of one kind in a row, as of a slider, are one."""
+    """Sessions before and after the one at hand. Steps of one kind in a row, as of a slider, are one, unless
+    there is a pause between them."""
 
     now: Session = field(default_factory=Session)
     before: list[Session] = field(default_factory=list)
     after: list[Session] = field(default_factory=list)
     _kind: str = ""
+    _when: float = 0.0
 
     def do(self, session: Session, kind: str = "") -> None:
         """Go on to a session; kind: of the step, "" for one that stands for itself."""
-        if not kind or kind != self._kind:
+        now = time.monotonic()
+        if not kind or kind != self._kind or now - self._when > PAUSE:
             self.before.append(self.now)
-        self._kind = kind
+        self._kind, self._when = kind, now
         self.now = session
         self.after.clear()
 

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
+from ridgefeature.merge import LEAST_BORDER
+from ridgefeature.readable import reason
 from ridgefeature.viewer import curves
 from ridgefeature.viewer.session import LEAST, MOST, Feature
 
@@ -14,6 +17,8 @@ if TYPE_CHECKING:
     from ridgefeature.viewer.page import Page
 
 Array = NDArray[np.float64]
+_ROUNDED = 1e-3
+"""Relative difference of a value from a limit as it was told, rounded."""
 FIELDS = ("h", "w", "height", "width")
 """What of it is changed there."""
 
@@ -28,10 +33,11 @@ class Sizes:
     def tell(self, feature: Feature) -> None:
         """Tell the page what its sliders and fields are."""
         height, width = (_largest(x, feature) for x in (feature.ridge.height, feature.ridge.width))
-        told = feature.h, feature.w, f"{height:.5g}", f"{width:.5g}"
+        told = _short(feature.h), _short(feature.w), f"{height:.5g}", f"{width:.5g}"
         self.fields = dict(zip(FIELDS, told, strict=True))
         tell = self.page.tell
         tell.h, tell.w, tell.height, tell.width = told
+        tell.most_w = _reach(feature, "w")[1]
 
     def slide(self, rate: str, value: float) -> None:
         """Another rate, "h" or "w", for the chosen ridge or its stretch; a slider's steps are one undo.
@@ -50,11 +56,22 @@ class Sizes:
         feature = self.page.feature
         if feature is None or what not in ("height", "width"):
             return
-        usual = _largest(getattr(feature.begun, what), feature)
-        if usual and not LEAST <= value / usual <= MOST:
-            low, high = sorted((LEAST * usual, MOST * usual))
-            raise ValueError(f"{what}: expected {low:.4g} to {high:.4g} {self.page.tell.unit}, got {value:g}")
-        self.slide(what[0], value / usual if usual else 1.0)
+        rate, limits = what[0], _reach(feature, what[0])
+
+        def off(to: float) -> float:
+            changed = feature.begun.resized(**{rate: to}, between=feature.between)
+            return _largest(getattr(changed, what), feature) - value
+
+        low, high = sorted(value + off(limit) for limit in limits)
+        if low == high:
+            return
+        if not low - _ROUNDED * abs(low) <= value <= high + _ROUNDED * abs(high):
+            got = "no number" if np.isnan(value) else f"{value:g}"
+            raise ValueError(f"{what}: expected {low:.4g} to {high:.4g} {self.page.tell.unit}, got {got}")
+        if low < value < high:
+            self.slide(rate, float(brentq(off, *limits, xtol=1e-12)))
+        else:
+            self.slide(rate, min(limits, key=lambda limit: abs(off(limit))))
 
     def edited(self, told: dict[str, Any]) -> bool:
         """Fields of the page, FIELDS, as they are now; whether one was changed there: the first counts."""
@@ -72,8 +89,10 @@ class Sizes:
             else:
                 self.absolute(changed, wanted)
         except ValueError as error:
-            self.page.say(str(error), bad=True)
+            self.page.say(reason(error), bad=True)
             self.page.refresh()
+        else:
+            self.page.right()
         return True
 
     def reset(self) -> None:
@@ -113,6 +132,21 @@ class Sizes:
         """The rates hold along the whole ridge."""
         if self.page.session.chosen is not None:
             self.page.do(self.page.session.along(self.page.session.chosen, None))
+
+
+def _short(rate: float) -> float:
+    """As fields show it."""
+    return float(f"{rate:.4g}")
+
+
+def _reach(feature: Feature, rate: str) -> tuple[float, float]:
+    """The least and the largest rate that there is room for, "h" or "w", of hundredths."""
+    if rate == "h":
+        return LEAST, MOST
+    begun, low, high = feature.begun, *(feature.between or (-np.inf, np.inf))
+    inside = (begun.arc_length >= low) & (begun.arc_length <= high)
+    room = float((begun.border / (LEAST_BORDER * begun.width))[inside].min())
+    return LEAST, float(np.clip(np.floor(100.0 * room * (1 - 1e-9)) / 100.0, 1.0, MOST))
 
 
 def _largest(values: Array, feature: Feature) -> float:

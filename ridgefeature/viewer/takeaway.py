@@ -24,7 +24,7 @@ w = {w:g}
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
 ridge = rf.load(here / "{feature}")
-result = cq.Workplane(cx.face({ridge}))
+result = cq.Workplane(cx.face({ridge}, unit="mm"))
 if "show_object" in globals():
     show_object(result)  # noqa: F821
 else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.diagnosis import diagnose
+from ridgefeature.doubts import pick_missed
 from ridgefeature.io.colours import Pixels, colours_at
 from ridgefeature.io.read import FORMATS, read_scan
 from ridgefeature.march import INTERRUPTED
-from ridgefeature.readable import reason
+from ridgefeature.readable import number, reason
 from ridgefeature.registration import NoRidgeError, register
 from ridgefeature.ridge import Ridge
 from ridgefeature.synthetic import Spiral
@@ -25,6 +27,12 @@ from ridgefeature.viewer.part_preview import PartPreview, aside
 
 _EVERY, _FIRST = 0.03, 0.01
 """Seconds between two looks at what was found, and before anything is."""
+
+
+_SETTLES = 0.4
+"""Seconds without a template after which a march has come to its end."""
+MARCHING = "Marching"
+"""What the page tells as long as a march can be stopped."""
 
 
 class Work:
@@ -111,22 +119,26 @@ class Work:
         page.scene.mark(place, "pick", 11.0)
         at = (float(place[0]), float(place[1]), float(place[2]))
         self.march = March(page.scan, at, page.tell.kind)
-        with self._telling("Marching"):
+        with self._telling(MARCHING):
             async with self._lock:
                 await self._register(self.march)
 
     async def _register(self, march: March) -> None:
-        page, shown = self.page, 0
+        page, shown, last = self.page, 0, time.monotonic()
         task = asyncio.ensure_future(aside(march.run))
         while not task.done():
             await asyncio.wait({task}, timeout=_EVERY if shown else _FIRST)
+            if shown and page.tell.busy == MARCHING and time.monotonic() - last > _SETTLES:
+                with page.tell:
+                    page.tell.busy = "Fitting the whole ridge"
             if len(march.templates) > shown:
+                last = time.monotonic()
                 for number, template in enumerate(march.templates[shown:], shown):
                     page.scene.show_template(template, number)
                 shown = len(march.templates)
                 page.scene.coarse(True)
                 with page.tell:
-                    page.tell.count = shown
+                    page.tell.busy, page.tell.count = MARCHING, shown
                 page.draw()
         page.scene.hide("template ")
         page.scene.coarse(False)
@@ -145,10 +157,18 @@ class Work:
     async def _add(self, ridge: Ridge, march: March) -> None:
         page = self.page
         await aside(lambda: page.pointing.points_near(ridge))
+        page.scene.mark(None, "pick")
+        known = page.session.again(ridge)
+        if known is not None:
+            page.choose(known)
+            page.say(f"This is {known} again. To register it anew, remove it first.")
+            return
         page.do(page.session.added(ridge, march.at))
+        missed = pick_missed(ridge)
+        far = "" if missed is None else f" The pick lies {number(missed[0], 3)} {ridge.unit} from it."
         early = march.stopped and INTERRUPTED in ridge.stop
         stopped = " It was stopped: what was found is kept." if early else ""
-        page.say(f"{page.session.chosen}: {len(ridge.templates)} templates.{stopped} {HINT}")
+        page.say(f"{page.session.chosen}: {len(ridge.templates)} templates.{far}{stopped} {HINT}")
         await self._diagnose(ridge)
         page.refresh()
 

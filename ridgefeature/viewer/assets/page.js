@@ -43,13 +43,20 @@
 
   // The curves: pointing marks the place, dragging chooses a stretch.
   let from = null;
+  const shade = (plot, to) => {
+    const band = plot.querySelector(".dragged") || plot.appendChild(Object.assign(document.createElement("div"), { className: "dragged" }));
+    band.style.left = 100 * Math.min(from, to) + "%";
+    band.style.width = 100 * Math.abs(to - from) + "%";
+  };
   document.addEventListener("pointerdown", (e) => { const plot = on(e, ".plot"); from = plot ? part(e, plot)[0] : null; if (plot) plot.setPointerCapture(e.pointerId); });
   document.addEventListener("pointermove", (e) => {
     const plot = on(e, ".plot");
+    if (plot && from !== null && e.buttons) shade(plot, part(e, plot)[0]);
     if (plot && Date.now() - hovered >= 50) { hovered = Date.now(); tell("point", part(e, plot)[0]); }
   });
   document.addEventListener("pointerup", (e) => {
     const plot = on(e, ".plot");
+    document.querySelectorAll(".dragged").forEach((band) => band.remove());
     if (plot && from !== null && Math.abs(part(e, plot)[0] - from) > 0.02) tell("stretch", from, part(e, plot)[0]);
     from = null;
   });
@@ -82,14 +89,17 @@
   }, true);
 
   // A name that is to be another is there to be typed over.
+  document.addEventListener("focusout", (e) => {
+    if (e.target.id === "new-name" && !e.relatedTarget) setTimeout(() => document.querySelector(".ridge.chosen .name")?.focus());
+  });
   document.addEventListener("focusin", (e) => { if (e.target.id === "new-name") setTimeout(() => e.target.select()); });
 
   // Files: dropped on the page, or chosen.
+  const leaves = (name) => !document.querySelector(".ridge")
+    || confirm(`Open ${name}? The ridges of this scan are lost unless you save the page first.`);
   const send = async (file) => {
     if (!file) return;
-    const kept = document.querySelectorAll(".ridge").length;
-    const another = window.ridgeOpens !== "host";
-    if (kept && another && !confirm(`Open ${file.name}? The ridges of this scan are lost unless you save the page first.`)) return;
+    if (window.ridgeOpens !== "host" && !leaves(file.name)) return;
     tell("sending", file.name, file.size);
     let answer = null;
     try {
@@ -105,6 +115,11 @@
     e.preventDefault(); document.body.classList.remove("dropping"); send(e.dataTransfer.files[0]);
   });
   document.addEventListener("change", (e) => {
+    if (e.target.id === "folder") {
+      const name = e.target.value;
+      e.target.selectedIndex = 0;
+      if (leaves(name)) tell("open", name);
+    }
     if (e.target.matches?.("#file, #host-file")) {
       window.ridgeOpens = e.target.id === "file" ? "scan" : "host";
       send(e.target.files[0]); e.target.value = ""; window.ridgeOpens = "scan";
