@@ -19,15 +19,17 @@ from ridgefeature.viewer.scene import Scene
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 _FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+SLOW = (str(Path(__file__).with_name("slow_view.py")),)
+"""The program with a march that can be stopped in time."""
 _WAIT = 60_000
 """Milliseconds."""
 
 
 @contextmanager
-def served(folder: Path, *words: str) -> Iterator[str]:
+def served(folder: Path, *words: str, program: tuple[str, ...] = ("-m", "ridgefeature")) -> Iterator[str]:
     """The page's address; `words` are what the command is asked besides."""
     log = folder / "view.log"
-    command = [sys.executable, "-u", "-m", "ridgefeature", "view", "--no-browser", *words]
+    command = [sys.executable, "-u", *program, "view", "--no-browser", *words]
     with log.open("w") as file:
         process = subprocess.Popen(command, cwd=folder, stdout=file, stderr=subprocess.STDOUT)
     try:
