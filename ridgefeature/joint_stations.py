@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
+from ridgefeature.end_caps import uncurled
 from ridgefeature.joint import Joint
 from ridgefeature.kernels.strip import E, H, W
 from ridgefeature.medians import median
@@ -38,7 +39,9 @@ def stations_of(
     closed = path.overlap > 0
     start, end = between or (float(path.at[0]) + path.overlap, float(path.at[-1]) - path.overlap)
     s = np.linspace(start, end, count)
-    spine = _places(joint, s, False)[0]
+    spine, up, sizes, _ = _places(joint, s, False)
+    if not closed:
+        spine = uncurled(spine, up, sizes[:, 1], sizes[:, 2])
     chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spine, axis=0), axis=1))])
     if closed:
         spine[-1] = spine[0]
