@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ridgefeature.basis import periodic_interpolation
 from ridgefeature.bspline import Curve
-from ridgefeature.end_caps import uncurled
+from ridgefeature.curled_ends import uncurled
 from ridgefeature.joint import Joint
 from ridgefeature.kernels.strip import E, H, W
 from ridgefeature.medians import median

@@ -478,6 +478,40 @@ def test_a_part_follows_the_sliders_and_the_click(work: Work, found: Page, unche
     assert taller == same and taller > 0
 
 
+def test_a_ridge_is_turned_on_its_part(work: Work, found: Page, unchecked: None) -> None:
+    async def story() -> list[np.ndarray]:
+        await work.preview.paste()
+        sizes = []
+        for turn in (0.0, 90.0, -90.0, 180.0):
+            found.tell.part_turn = turn
+            work.preview.again()
+            assert work.preview._task is not None
+            await work.preview._task
+            assert work.preview.part is not None, found.tell.hint
+            sizes.append(np.ptp(work.preview.part.points[np.unique(work.preview.part.grown)], axis=0))
+        return sizes
+
+    along, across, other, back = asyncio.run(story())
+    assert along[0] > 2 * along[1]
+    np.testing.assert_allclose(across[[1, 0, 2]], along, rtol=0.01)
+    np.testing.assert_allclose(other, across, rtol=0.01)
+    np.testing.assert_allclose(back, along, rtol=0.01)
+
+
+@pytest.mark.parametrize("turn", [30.0, -135.0])
+@pytest.mark.parametrize("kind", preview.HOSTS)
+def test_turned_directions_lie_on_the_face(kind: str, turn: float) -> None:
+    host, at = preview.host_for(kind, registered())
+    told = preview.direction_on(host, at, registered(), turn)
+    straight = preview.direction_on(host, at, registered(), 1e-9)
+    assert told is not None and straight is not None
+    assert preview.direction_on(host, at, registered(), 0.0) is None
+    cosine = told @ straight / np.linalg.norm(told) / np.linalg.norm(straight)
+    assert cosine == pytest.approx(np.cos(np.radians(turn)), abs=1e-6)
+    outwards = {"plane": [0, 0, 1]}.get(kind, [-1, 0, 0])
+    np.testing.assert_allclose([told @ outwards, straight @ outwards], 0, atol=1e-6 * np.linalg.norm(told))
+
+
 def test_a_part_stays_as_it_was_where_it_cannot_be_put(work: Work, found: Page, unchecked: None) -> None:
     async def story() -> None:
         await work.preview.paste()

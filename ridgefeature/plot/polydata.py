@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 Array = NDArray[np.float64]
@@ -34,6 +35,16 @@ def triangles(points: Array, corners: Corners) -> vtkPolyData:
     data = _points(points)
     data.SetPolys(_cells(corners))
     return data
+
+
+def smooth(mesh: vtkPolyData) -> vtkPolyData:
+    """A mesh with normals at its points, so that light does not show its triangles; edges are twice there."""
+    normals = vtkPolyDataNormals()
+    normals.SetInputData(mesh)
+    normals.SplittingOff()
+    normals.ConsistencyOff()
+    normals.Update()
+    return normals.GetOutput()
 
 
 def quads(grid: Array) -> vtkPolyData:

@@ -34,7 +34,7 @@ TOLD: dict[str, Any] = {
     "stretch": "", "can_undo": False, "can_redo": False, "colouring": "height", "dark": False,
     "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "most_w": MOST,
     "height": "", "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane",
-    "part_note": "", "host_name": "", "coloured": False, "earlier": False,
+    "part_note": "", "host_name": "", "coloured": False, "earlier": False, "part_turn": 0.0,
 }  # fmt: skip
 """What the page knows, and how it begins."""
 

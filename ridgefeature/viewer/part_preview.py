@@ -41,8 +41,8 @@ class PartPreview:
         self._host: tuple[Any, ...] = ()
         """Kind, ridge, solid and the place where the ridge goes first."""
         self._at: Array | None = None
-        self._good: tuple[Ridge, Array] | None = None
-        """What was pasted last on this host, and where."""
+        self._good: tuple[Ridge, Array, float] | None = None
+        """What was pasted last on this host, where, and by how many degrees it was turned."""
         self._task: asyncio.Task[None] | None = None
         self._again = False
 
@@ -63,7 +63,7 @@ class PartPreview:
             page.scene.keep_camera()
         self._host, self._at, self._good, self.part = (), None, None, None
         with page.tell:
-            page.tell.pasting, page.tell.part_note = True, ""
+            page.tell.pasting, page.tell.part_note, page.tell.part_turn = True, "", 0.0
         self._begin()
         if self._task is not None:
             await self._task
@@ -120,8 +120,11 @@ class PartPreview:
         self.part, self._good, page.tell.part_note = None, None, ""
         if self._again:
             return ""
-        if good and page.feature is not None and good[0] is page.feature.ridge and good[1] is not here:
+        same = good is not None and page.feature is not None and good[0] is page.feature.ridge
+        if good and same and (good[1] is not here or good[2] != page.tell.part_turn):
             self._at, self._again = good[1], True
+            with page.tell:
+                page.tell.part_turn = good[2]
             return f"{wrong} It stays where it was."
         await self._show_host()
         page.say(wrong, bad=True)
@@ -138,7 +141,8 @@ class PartPreview:
             page.say(_CHOOSE)
             return
         first = self.part is None
-        part = await aside(partial(preview.pasted, feature.ridge, self._host[2], self._at))
+        turn = float(page.tell.part_turn or 0.0)
+        part = await aside(partial(preview.pasted, feature.ridge, self._host[2], self._at, turn))
         if not page.tell.pasting:
             return
         self.part = part
@@ -149,7 +153,7 @@ class PartPreview:
         page.draw()
         at = self._at
         await self._check(part)
-        self._good = feature.ridge, at
+        self._good = feature.ridge, at, turn
 
     async def _choose_host(self, feature: Feature) -> None:
         kind = str(self.page.tell.host)

@@ -17,6 +17,8 @@ Corners = NDArray[np.int64]
 HOSTS = ("plane", "cylinder", "sphere")
 _ROOM = 1.1
 """Size of a host's face, in that of what a ridge may need."""
+_RING = 0.1
+"""Distance between the ends of what has no direction of its own, in its length."""
 _FINE, _BEND = 1e-3, 0.25
 """Distance of triangles from the surface, in the part's size; angle between two of them."""
 
@@ -82,8 +84,30 @@ def nearest_on(host: Any, place: Array) -> Array:
     return np.array([found.X(), found.Y(), found.Z()])
 
 
-def pasted(ridge: Ridge, host: Any, at: Array) -> Part:
-    """The ridge on the face of a host that is nearest to a place (3,).
+def direction_on(host: Any, at: Array, ridge: Ridge, turn: float) -> Array | None:
+    """The direction (3,) of a ridge on the face at a place (3,): that in space, turned by so many degrees.
+
+    None, which leaves it to `cad_export.paste`, for no turn.
+    """
+    if not turn:
+        return None
+    import cadquery as cq
+
+    place = cq.Vertex.makeVertex(*map(float, at))
+    face = min(host.Faces(), key=lambda f: f.distance(place))
+    normal = np.array(face.normalAt(cq.Vector(*map(float, at))).toTuple())
+    chord = ridge.spine[-1] - ridge.spine[0]
+    if np.linalg.norm(chord) < _RING * ridge.length:
+        chord = ridge.tangent[len(ridge.tangent) // 2]
+    along = chord - normal * (chord @ normal)
+    if np.linalg.norm(along) < 0.5 * np.linalg.norm(chord):
+        along = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    angle = np.radians(turn)
+    return np.asarray(np.cos(angle) * along + np.sin(angle) * np.cross(normal, along))
+
+
+def pasted(ridge: Ridge, host: Any, at: Array, turn: float = 0.0) -> Part:
+    """The ridge on the face of a host that is nearest to a place (3,), turned there by so many degrees.
 
     It has passed the fast certificate of `cad_export.paste`, not its search for self-intersections. Raises
     ValueError as that does.
@@ -91,7 +115,8 @@ def pasted(ridge: Ridge, host: Any, at: Array) -> Part:
     import cad_export as cx
 
     report: dict[str, Any] = {}
-    solid = cx.paste(ridge, host, at=at, check=False, report=report)
+    direction = direction_on(host, at, ridge, turn)
+    solid = cx.paste(ridge, host, at=at, direction=direction, check=False, report=report)
     told = f"{report['volume_added']:+,.4g} mm3 by the ridge, {report['volume_expected']:+,.4g} expected"
     return Part(solid, *_triangles(solid, [face for face, _ in cx.carried_by(solid)]), told)
 

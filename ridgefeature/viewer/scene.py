@@ -21,7 +21,7 @@ from vtkmodules.vtkRenderingCore import (
 
 from ridgefeature.curvilinear import crest
 from ridgefeature.plot.marks import outline
-from ridgefeature.plot.polydata import actor_in, line, move, paint, quads, triangles, vertices
+from ridgefeature.plot.polydata import actor_in, line, move, paint, quads, smooth, triangles, vertices
 from ridgefeature.ridge import Ridge
 from ridgefeature.template import Template
 from ridgefeature.viewer.colours import Pixels, plane_axes
@@ -126,7 +126,7 @@ class Scene:
     def show_part(self, points: Array, corners: NDArray[np.int64], grown: NDArray[np.int64]) -> None:
         """A solid: triangles (m, 3) of its own, and of a ridge on it (k, 3). All else is hidden."""
         for name, own, colour in (("part", corners, _PART), ("part ridge", grown, _CHOSEN)):
-            look = self._show(name, triangles(points, own)).GetProperty()
+            look = self._show(name, smooth(triangles(points, own))).GetProperty()
             look.SetColor(*colour)
             look.SetAmbient(0.35)
             look.SetDiffuse(0.65)

@@ -50,11 +50,7 @@ def serve(
     for name, what in triggers(page, work).items():
         server.controller.trigger(name)(what)
 
-    @server.state.change(*FIELDS)
-    def edited(**told: Any) -> None:
-        if page.sizes.edited({field: told[field] for field in FIELDS}):
-            work.preview.again()
-
+    _watch(server, page, work)
     wrong: list[Exception] = []
     with tempfile.TemporaryDirectory(prefix="ridgefeature-") as folder:
         names = LOOPBACK if host in ("127.0.0.1", "localhost", "::1") else (*LOOPBACK, host)
@@ -97,6 +93,19 @@ async def _opened(work: Work, scan: Path | None, unit: str | None, show: Callabl
     if not opening.done() or not opening.exception():
         show()
     await opening
+
+
+def _watch(server: Any, page: Page, work: Work) -> None:
+    """Follow what is changed on the page besides what it asks for."""
+
+    @server.state.change(*FIELDS)
+    def edited(**told: Any) -> None:
+        if page.sizes.edited({field: told[field] for field in FIELDS}):
+            work.preview.again()
+
+    @server.state.change("part_turn")
+    def turned(**_: Any) -> None:
+        work.preview.again()
 
 
 def _markup(server: Any, scene: Scene, files: list[str]) -> Any:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ridgefeature as rf
-from ridgefeature.end_caps import uncurled
+from ridgefeature.curled_ends import uncurled
 from ridgefeature.section import bell
 
 WIDTH = 8.0
