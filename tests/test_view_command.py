@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
 import urllib.error
@@ -46,6 +47,14 @@ def test_without_the_token_there_is_no_page(tmp_path: Path) -> None:
         for path in ("own/../../../etc/passwd", "own/%2e%2e/%2e%2e/serve.py", "../../etc/passwd"):
             with pytest.raises(urllib.error.HTTPError, match=r"40[34]"):
                 opener.open(bare + path)
+
+
+def test_a_port_that_is_in_use_is_told() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        fails(
+            run("view", "--no-browser", "--port", port), 2, f"--port: expected a free one, {port} is in use"
+        )
 
 
 @pytest.mark.parametrize(

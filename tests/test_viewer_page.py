@@ -498,6 +498,24 @@ def test_a_ridge_is_turned_on_its_part(work: Work, found: Page, unchecked: None)
     np.testing.assert_allclose(back, along, rtol=0.01)
 
 
+def test_another_host_is_looked_at_anew(work: Work, found: Page, unchecked: None) -> None:
+    async def story() -> list[np.ndarray]:
+        await work.preview.paste()
+        eyes = []
+        for kind in ("plane", "cylinder", "sphere", "plane"):
+            found.tell.host = kind
+            work.preview.again()
+            assert work.preview._task is not None
+            await work.preview._task
+            assert work.preview.part is not None and work.preview._host[0] == kind
+            eyes.append(np.array(found.scene.renderer.GetActiveCamera().GetDirectionOfProjection()))
+        return eyes
+
+    plane, cylinder, sphere, again = asyncio.run(story())
+    assert plane[2] < -0.8 and cylinder[0] > 0.8 and sphere[0] > 0.8
+    np.testing.assert_allclose(again, plane, atol=1e-6)
+
+
 @pytest.mark.parametrize("turn", [30.0, -135.0])
 @pytest.mark.parametrize("kind", preview.HOSTS)
 def test_turned_directions_lie_on_the_face(kind: str, turn: float) -> None:

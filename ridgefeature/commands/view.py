@@ -32,4 +32,11 @@ def run(scan: Path | None, unit: str | None, host: str, port: int, upload: int, 
             webbrowser.open(address)
 
     with interrupts.at_once():
-        serve(scan, unit, host, port, upload * _MEGABYTE, ready)
+        try:
+            serve(scan, unit, host, port, upload * _MEGABYTE, ready)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
+            raise ValueError(
+                f"--port: expected a free one, {port} is in use; choose another, or leave it out"
+            ) from None

@@ -165,7 +165,8 @@ class PartPreview:
             solid, at = self._file, None
         else:
             solid, at = await aside(lambda: preview.host_for(kind, feature.registered))
-        same = bool(self._host) and kind == "file"
+        self.part, self._good = None, None
+        same = bool(self._host) and self._host[0] == kind == "file"
         self._host, self._at = (kind, feature.registered, solid, at), self._at if same else at
 
     async def _show_host(self) -> None:

@@ -103,8 +103,8 @@ def _watch(server: Any, page: Page, work: Work) -> None:
         if page.sizes.edited({field: told[field] for field in FIELDS}):
             work.preview.again()
 
-    @server.state.change("part_turn")
-    def turned(**_: Any) -> None:
+    @server.state.change("host", "part_turn")
+    def placed(**_: Any) -> None:
         work.preview.again()
 
 
