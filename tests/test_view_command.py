@@ -49,6 +49,14 @@ def test_without_the_token_there_is_no_page(tmp_path: Path) -> None:
                 opener.open(bare + path)
 
 
+def test_a_file_that_is_no_scan_is_told_and_ends_it(tmp_path: Path) -> None:
+    (tmp_path / "here.npy").write_bytes(b"")
+    result = run("view", "--no-browser", tmp_path / "here.npy")
+    assert result.exit_code == 2
+    [line] = result.stderr.splitlines()
+    assert line.startswith("ridgefeature: ") and "here.npy: " in line
+
+
 def test_a_port_that_is_in_use_is_told() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
@@ -61,7 +69,6 @@ def test_a_port_that_is_in_use_is_told() -> None:
     ("words", "told"),
     [
         (["nothere.npy"], "nothere.npy: No such file or directory"),
-        (["here.npy"], "here.npy: "),
         (["here.npy", "--unit", "parsec"], "expected a length unit"),
         (["--port", "99999"], "99999"),
         (["--upload", "0"], "0"),
