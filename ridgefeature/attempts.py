@@ -108,9 +108,12 @@ def _same(one: Ridge, other: Ridge) -> bool:
 
 def _has_pick(ridge: Ridge, aside: float) -> bool:
     """Whether the pick lies on the surface and between the ends, and no more widths aside of the spine."""
-    s, y, _ = (float(x[0]) for x in local_coordinates(ridge, ridge.pick[None]))
-    width, height = float(np.interp(s, ridge.arc_length, ridge.width)), median(np.abs(ridge.height))
-    off = abs(float(ridge.distance(ridge.pick[None])[0]))
+    s, y, z = (float(x[0]) for x in local_coordinates(ridge, ridge.pick[None]))
+    width = float(np.interp(s, ridge.arc_length, ridge.width))
     beyond = 0.0 if ridge.closed else max(-s, s - ridge.length)
-    # There is no distance where the surface is not: past an end, if only by noise.
-    return abs(y) <= aside * width and beyond <= _BEYOND * width and not off > _OFF * height
+    if abs(y) > aside * width or beyond > _BEYOND * width:
+        return False
+    off = _OFF * median(np.abs(ridge.height))
+    under = float(np.interp(s, ridge.arc_length, ridge.height) * ridge.section(np.array(y / width)))
+    # Straight up is no nearer than the surface, whose distance takes long. There is none past an end.
+    return abs(z - under) <= off or not abs(float(ridge.distance(ridge.pick[None])[0])) > off
