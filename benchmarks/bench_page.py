@@ -42,6 +42,16 @@ _WATCH = """() => {
 }"""
 
 
+class _Told(SimpleNamespace):
+    """What a page would know."""
+
+    def __enter__(self) -> _Told:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
 def clicks(report: Report, folder: Path, times: int) -> None:
     """From the click to the first template, and to the finished ridge, as the page sees both."""
     points = SPIRAL.points(100_000, noise=0.1)
@@ -76,7 +86,7 @@ def slides(report: Report) -> None:
     scan = rf.Scan(SPIRAL.points(100_000, noise=0.1))
     scene, pictures = Scene(), vtkWebApplication()
     pictures.SetImageEncoding(pictures.ENCODING_NONE)
-    told: Any = SimpleNamespace(**TOLD)
+    told: Any = _Told(**TOLD)
 
     def draw() -> None:
         pictures.InvalidateCache(scene.window)

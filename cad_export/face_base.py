@@ -236,18 +236,38 @@ def _place(host: Host, at: Any, near: float) -> Floats:
     return x
 
 
-def _tangent(host: Host, ridge: Ridge, place: Floats, direction: Any, reverse: bool) -> Floats:
-    """The path's tangent (3,) in the middle of the ridge, for its mean direction to lie along `direction`."""
-    middle = len(ridge.arc_length) // 2
+def direction_at(face: Any, ridge: Ridge, at: Any) -> tuple[Floats, Floats]:
+    """The direction (3,) that a ridge has on a face at a place (3,) unless another one is given, and the
+    face's normal (3,) there."""
+    host = host_of(_face(face))
+    place = nearest(host.face, host, vector(at, "at")[None])[0]
+    normal = host.frame(place[0], place[1])[1]
+    return _own_direction(host, place, normal, _mean(ridge)[1]), normal
+
+
+def _mean(ridge: Ridge) -> tuple[Floats, Floats]:
+    """A ridge's mean direction, unrolled (2,) and in space (3,); in its middle, where it has none."""
     points, angles = developed(ridge)
     mean, chord = points[-1] - points[0], ridge.spine[-1] - ridge.spine[0]
-    if np.linalg.norm(mean) < 0.1 * ridge.length:  # a ring or a spiral has no mean direction
+    if np.linalg.norm(mean) < 0.1 * ridge.length:  # a ring or a spiral
+        middle = len(ridge.arc_length) // 2
         mean, chord = np.array([np.cos(angles[middle]), np.sin(angles[middle])]), ridge.tangent[middle]
+    return mean, chord
+
+
+def _own_direction(host: Host, place: Floats, normal: Floats, chord: Floats) -> Floats:
+    along_face = chord - normal * (chord @ normal)
+    if np.linalg.norm(along_face) < 0.5 * np.linalg.norm(chord):
+        return longer_direction(host, place)
+    return along_face
+
+
+def _tangent(host: Host, ridge: Ridge, place: Floats, direction: Any, reverse: bool) -> Floats:
+    """The path's tangent (3,) in the middle of the ridge, for its mean direction to lie along `direction`."""
+    mean, chord = _mean(ridge)
     normal = host.frame(place[0], place[1])[1]
     if direction is None:
-        along_face = chord - normal * (chord @ normal)
-        if np.linalg.norm(along_face) < 0.5 * np.linalg.norm(chord):
-            along_face = longer_direction(host, place)
+        along_face = _own_direction(host, place, normal, chord)
     else:
         given = vector(direction, "direction")
         along_face = given - normal * (given @ normal)
@@ -255,6 +275,7 @@ def _tangent(host: Host, ridge: Ridge, place: Floats, direction: Any, reverse: b
             what = "one along the face's normal" if given.any() else "a zero vector"
             raise ValueError(f"direction: expected one along the face, got {what}; choose another")
     ahead = along_face / np.linalg.norm(along_face) * (-1 if reverse else 1)
+    angles = developed(ridge)[1]
     turn = float(np.interp(0.5 * ridge.length, ridge.arc_length, angles) - np.arctan2(mean[1], mean[0]))
     return np.cos(turn) * ahead + np.sin(turn) * np.cross(normal, ahead)
 

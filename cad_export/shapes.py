@@ -23,9 +23,10 @@ from ridgefeature.scan import millimetres_per
 def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1, unit: str | None = None) -> cq.Face:
     """One face with the exact poles and knots of ridge.resized(h=h, w=w).surface(), or of a Surface.
 
-    In the frame of the ridge and in its unit, or another one such as "mm"; natural bounds; its normal is
-    du x dv. Raises ValueError for anything that is neither, for rates of a plain Surface and for an unknown
-    unit; warns where a ridge's surface folds over itself. The face carries the feature (`carried_by`).
+    In the frame of the ridge and in its unit, or another one such as "mm", where a Surface has none; natural
+    bounds; its normal is du x dv. Raises ValueError for anything that is neither, for rates of a plain
+    Surface and for an unknown unit; warns where a ridge's surface folds over itself. The face carries the
+    feature (`carried_by`).
     """
     surface = checked_surface(ridge, h, w)
     if unit is not None:

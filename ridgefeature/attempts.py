@@ -59,17 +59,19 @@ def ridge_meant(attempt: Attempt, extent: float, hints: Hints) -> Ridge:
     Raises NoRidgeError where there is none.
     """
     found = _first_found(attempt, extent, hints)
-    if hints.width is not None or _has_pick(found, _FOOT):
+    if hints.width is not None or INTERRUPTED in found.stop or _has_pick(found, _FOOT):
         return found
     again = 0
     for step in _BESIDE_IT:
         own = replace(hints, width=median(found.width) * LADDER**step)
         with suppress(NoRidgeError):
             other = attempt(own, extent)
+            if INTERRUPTED in other.stop:
+                break
             if _has_pick(other, _CREST) and other.length > _AS_LONG * found.length:
                 return other
             again += _same(found, other)
-            if again == _SURE or INTERRUPTED in other.stop:
+            if again == _SURE:
                 break
     return found
 

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 _WIDTHS = np.exp(np.linspace(-0.25, 0.25, 21))
 """Widths that are looked at, in that which keeps the width at half height."""
 _UNTOLD = 1.0, 0.0, 0.0, 0.0, 0.0
+"""What is found where points tell nothing: no change."""
 _UNKNOWN = 2
 """Height and place, beside the changes of the base."""
 

@@ -76,6 +76,11 @@ def test_a_width_that_is_given_or_an_interrupt_ends_the_search():
     stopped = replace(aside(0.4), stop=(INTERRUPTED, INTERRUPTED))
     tried = Attempts(found, stopped, aside(0.0))
     assert ridge_meant(tried, EXTENT, Hints()) is found and len(tried.asked) == 2
+    there = replace(aside(0.0), stop=(INTERRUPTED, INTERRUPTED))
+    assert ridge_meant(Attempts(found, there), EXTENT, Hints()) is found, "what is whole is kept"
+    stopped = replace(aside(0.7), stop=("an end", INTERRUPTED))
+    tried = Attempts(stopped, aside(0.0))
+    assert ridge_meant(tried, EXTENT, Hints()) is stopped and len(tried.asked) == 1
 
 
 def test_where_there_is_none_all_is_tried_and_the_reason_is_the_widest_searchs():

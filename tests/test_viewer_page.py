@@ -156,6 +156,8 @@ def test_fields_of_the_page_change_the_ridge_and_nonsense_is_told(found: Page) -
     assert found.tell.h == 1.25 and float(found.tell.height) == pytest.approx(1.25 * HEIGHT, rel=0.03)
     assert found.sizes.edited(fields(height="6"))
     assert float(found.tell.height) == pytest.approx(6.0, rel=1e-4)
+    found.sizes.edited(fields(height=""))
+    assert "nan" not in found.tell.hint and "got no number" in found.tell.hint
     for nonsense in ("", "abc", None, "nan", "1e9", "-1", 0):
         for name in FIELDS:
             found.say("")
@@ -274,12 +276,11 @@ def test_what_is_wrong_with_a_value_stays_told_as_the_page_comes_to_rest(work: W
 
 
 def test_a_largest_value_is_met_in_a_stretch_and_room_is_told_as_it_is(found: Page) -> None:
-    assert found.feature is not None
-    found.sizes.stretch(*(curves.part_of(s, registered().length) for s in (10.0, 24.0)))
     wavy = registered().resized(height=lambda s: HEIGHT * (1 + 0.2 * np.cos(s)))
     found.do(Session().added(wavy, PICK))
     found.sizes.stretch(*(curves.part_of(s, wavy.length) for s in (10.0, 24.0)))
     found.sizes.absolute("height", 2 * HEIGHT)
+    assert found.feature is not None
     ridge = found.feature.ridge
     inside = (ridge.arc_length >= 10) & (ridge.arc_length <= 24)
     assert ridge.height[inside].max() == pytest.approx(2 * HEIGHT, rel=1e-9)
@@ -498,6 +499,73 @@ def test_a_ridge_is_turned_on_its_part(work: Work, found: Page, unchecked: None)
     np.testing.assert_allclose(back, along, rtol=0.01)
 
 
+def test_a_part_that_is_asked_for_twice_and_a_click_meanwhile_are_both_heard(
+    work: Work, found: Page, unchecked: None
+) -> None:
+    async def story() -> None:
+        both = [asyncio.ensure_future(work.preview.paste()) for _ in range(2)]
+        await asyncio.sleep(0)
+        await asyncio.gather(*both)
+        assert work.preview.part is not None and found.tell.busy == ""
+        points = work.preview.part.points
+        across, along = 0.98 * points[:, :2].max(axis=0)
+        corner = on(found, (across, along, work.preview._host[3][2]))
+        work.preview.again()
+        await asyncio.sleep(0.001)
+        await work.preview.put(*corner)
+        assert work.preview._task is not None
+        await work.preview._task
+        assert work.preview.part is not None and found.tell.hint.endswith("It stays where it was.")
+
+    asyncio.run(story())
+
+
+def test_who_left_while_it_was_pasted_stays_with_the_scan(work: Work, found: Page, unchecked: None) -> None:
+    async def story() -> None:
+        await work.preview.paste()
+        work.preview.again()
+        await asyncio.sleep(0.001)
+        work.preview.leave()
+        assert work.preview._task is not None
+        await work.preview._task
+
+    asyncio.run(story())
+    assert not found.tell.pasting and not found.tell.bad
+    assert found.scene._actors["still"].GetVisibility()
+
+
+def test_a_scan_that_is_opened_while_a_part_is_shown_is_seen(
+    work: Work, found: Page, unchecked: None
+) -> None:
+    asyncio.run(work.preview.paste())
+    assert not found.scene._actors["still"].GetVisibility()
+    found.show_scan(scan(), "again.ply")
+    assert found.scene._actors["still"].GetVisibility()
+
+
+def test_a_hidden_ridge_is_not_pointed_at(found: Page) -> None:
+    found.point(0.5)
+    assert "place" in found.scene.names()
+    found.toggle("ridge 1")
+    found.point(0.6)
+    assert "place" not in found.scene.names()
+    found.toggle("ridge 1")
+    assert "place" in found.scene.names()
+
+
+def test_what_is_wrong_again_is_told_again(work: Work, found: Page) -> None:
+    ask = triggers(found, work)
+    for _ in range(2):
+        ask["stretch"](0.5, 0.505)
+        assert found.tell.bad and found.tell.hint.startswith("This stretch is too short")
+    ask["set_unit"]("m")
+    assert found.tell.bad and found.tell.hint.startswith("The unit of a scan")
+    ask["rest"]()
+    assert found.tell.bad
+    ask["toggle"]("ridge 1")
+    assert not found.tell.bad
+
+
 def test_another_host_is_looked_at_anew(work: Work, found: Page, unchecked: None) -> None:
     async def story() -> list[np.ndarray]:
         await work.preview.paste()
@@ -526,6 +594,13 @@ def test_turned_directions_lie_on_the_face(kind: str, turn: float) -> None:
     assert preview.direction_on(host, at, registered(), 0.0) is None
     cosine = told @ straight / np.linalg.norm(told) / np.linalg.norm(straight)
     assert cosine == pytest.approx(np.cos(np.radians(turn)), abs=1e-6)
+    up = replace(
+        registered(), spine=registered().spine[:, [2, 1, 0]], tangent=registered().tangent[:, [2, 1, 0]]
+    )
+    across = [preview.direction_on(host, at, up, angle) for angle in (1e-9, turn)]
+    assert across[0] @ across[1] / np.linalg.norm(across[0]) / np.linalg.norm(across[1]) == pytest.approx(
+        np.cos(np.radians(turn)), abs=1e-6
+    )
     outwards = {"plane": [0, 0, 1]}.get(kind, [-1, 0, 0])
     np.testing.assert_allclose([told @ outwards, straight @ outwards], 0, atol=1e-6 * np.linalg.norm(told))
 

@@ -98,6 +98,9 @@ def test_a_ridge_that_was_found_before_is_known_by_its_path(session: Session) ->
     assert session.again(aside) is None
     assert session.without("groove 1").changed("ridge 1", shown=False).again(ridge) is None
     assert Session().again(ridge) is None
+    slim = ridge.resized(w=0.3)
+    assert session.without("groove 1").again(slim) is None, "another one on the same path"
+    assert session.without("groove 1").again(ridge.resized(h=-1)) is None
 
 
 def test_a_slider_is_one_step(session: Session) -> None:

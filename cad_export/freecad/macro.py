@@ -29,7 +29,7 @@ def write_macro(ridge: Ridge, path: str | os.PathLike[str]) -> Path:
     the rates that `ridge.resized` refuses. The macro also carries the feature as JSON. Every number is exact
     to the last bit; the poles are combined in the macro, exact to 1e-12 of the largest coordinate. On a base
     that is curved across they are not affine in the width: the macro makes them with numpy, which FreeCAD
-    brings, and takes rates of the width from 0.05 on.
+    brings, and takes rates of the width above 0.05.
     The file is written beside the path and renamed.
     Raises ValueError for something that is no Ridge or a name that does not end in .FCMacro, OSError where
     the file cannot be written.

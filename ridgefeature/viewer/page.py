@@ -35,6 +35,7 @@ TOLD: dict[str, Any] = {
     "kind": "ridge", "bar": 0.0, "bar_text": "", "help": False, "least": LEAST, "most": MOST, "most_w": MOST,
     "height": "", "width": "", "legend": [], "gradient": "", "pasting": False, "host": "plane",
     "part_note": "", "host_name": "", "coloured": False, "earlier": False, "part_turn": 0.0,
+    "marching": False,
 }  # fmt: skip
 """What the page knows, and how it begins."""
 
@@ -240,12 +241,12 @@ class Page:
             if feature.shown:
                 self.scene.show_ridge(feature.name, feature.ridge, feature.name == session.chosen)
         self._shown = names
-        if tell.pasting:
-            self.scene.only_part(True)
         tell.ridges = [{"name": f.name, "shown": f.shown} for f in session.features]
         tell.chosen = session.chosen or ""
         tell.can_undo, tell.can_redo = bool(self.history.before), bool(self.history.after)
         self._tell_feature()
+        if tell.pasting:
+            self.scene.only_part(True)
         self.draw()
         self.scale()
 
@@ -263,8 +264,6 @@ class Page:
         tell.profile = curves.profile(ridge, feature.between)
         tell.rows = [{"name": name, "value": value} for name, value in self._rows(feature)]
         self.pointing.show(feature, self.pointing.place(feature))
-        if not feature.shown:
-            self.scene.mark(None, "place")
 
     def _rows(self, feature: Feature) -> list[tuple[str, str]]:
         ridge, unit = feature.ridge, feature.ridge.unit

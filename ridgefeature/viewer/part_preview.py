@@ -118,7 +118,7 @@ class PartPreview:
         """After what went wrong: to the place where the same ridge was before, or to the bare host."""
         page, good, here = self.page, self._good, self._at
         self.part, self._good, page.tell.part_note = None, None, ""
-        if self._again:
+        if self._again or not page.tell.pasting:
             return ""
         same = good is not None and page.feature is not None and good[0] is page.feature.ridge
         if good and same and (good[1] is not here or good[2] != page.tell.part_turn):
@@ -127,7 +127,8 @@ class PartPreview:
                 page.tell.part_turn = good[2]
             return f"{wrong} It stays where it was."
         await self._show_host()
-        page.say(wrong, bad=True)
+        if page.tell.pasting:
+            page.say(wrong, bad=True)
         return ""
 
     async def _once(self, wrong: str) -> None:
@@ -140,20 +141,19 @@ class PartPreview:
             await self._show_host()
             page.say(_CHOOSE)
             return
-        first = self.part is None
-        turn = float(page.tell.part_turn or 0.0)
-        part = await aside(partial(preview.pasted, feature.ridge, self._host[2], self._at, turn))
-        if not page.tell.pasting:
+        first, host, at, turn = self.part is None, self._host, self._at, float(page.tell.part_turn or 0.0)
+        part = await aside(partial(preview.pasted, feature.ridge, host[2], at, turn))
+        if not page.tell.pasting or self._host is not host:
             return
         self.part = part
         page.scene.show_part(part.points, part.host, part.grown)
-        if first and self._host[3] is not None and not wrong:
+        if first and host[3] is not None and not wrong:
             page.scene.look_at_part(part.points, part.grown)
         page.say(wrong or _LIVE, bad=bool(wrong))
         page.draw()
-        at = self._at
         await self._check(part)
-        self._good = feature.ridge, at, turn
+        if self._host is host:
+            self._good = feature.ridge, at, turn
 
     async def _choose_host(self, feature: Feature) -> None:
         kind = str(self.page.tell.host)
@@ -171,9 +171,11 @@ class PartPreview:
 
     async def _show_host(self) -> None:
         """The host without a ridge, so that a face can be clicked."""
-        page = self.page
-        if self._host and page.tell.pasting:
-            bare = await aside(lambda: preview.bare(self._host[2]))
+        page, host = self.page, self._host
+        if host and page.tell.pasting:
+            bare = await aside(lambda: preview.bare(host[2]))
+            if not page.tell.pasting or self._host is not host:
+                return
             first = not any(name.startswith("part") for name in page.scene.names())
             page.scene.show_part(bare.points, bare.host, bare.grown)
             if first:

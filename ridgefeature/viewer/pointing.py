@@ -74,7 +74,7 @@ class Pointing:
         at = [np.interp(s, ridge.arc_length, ridge.spine[:, k]) for k in range(3)]
         up = [np.interp(s, ridge.arc_length, ridge.normal[:, k]) for k in range(3)]
         top = np.array(at) + float(np.interp(s, ridge.arc_length, ridge.height)) * np.array(up)
-        self.scene.mark(top, "place", 13.0)
+        self.scene.mark(top if feature.shown else None, "place", 13.0)
         where, y, z = self.points_near(feature.registered)
         slab = np.abs(where - s) < _SLICE * float(np.median(ridge.width))
         self.tell.section = curves.section(ridge, feature.registered, s, y[slab], z[slab])

@@ -17,8 +17,6 @@ Corners = NDArray[np.int64]
 HOSTS = ("plane", "cylinder", "sphere")
 _ROOM = 1.1
 """Size of a host's face, in that of what a ridge may need."""
-_RING = 0.1
-"""Distance between the ends of what has no direction of its own, in its length."""
 _FINE, _BEND = 1e-3, 0.25
 """Distance of triangles from the surface, in the part's size; angle between two of them."""
 
@@ -85,7 +83,7 @@ def nearest_on(host: Any, place: Array) -> Array:
 
 
 def direction_on(host: Any, at: Array, ridge: Ridge, turn: float) -> Array | None:
-    """The direction (3,) of a ridge on the face at a place (3,): that in space, turned by so many degrees.
+    """The direction (3,) of a ridge on the face at a place (3,): its own, turned by so many degrees.
 
     None, which leaves it to `cad_export.paste`, for no turn.
     """
@@ -93,15 +91,11 @@ def direction_on(host: Any, at: Array, ridge: Ridge, turn: float) -> Array | Non
         return None
     import cadquery as cq
 
+    from cad_export.face_base import direction_at
+
     place = cq.Vertex.makeVertex(*map(float, at))
     face = min(host.Faces(), key=lambda f: f.distance(place))
-    normal = np.array(face.normalAt(cq.Vector(*map(float, at))).toTuple())
-    chord = ridge.spine[-1] - ridge.spine[0]
-    if np.linalg.norm(chord) < _RING * ridge.length:
-        chord = ridge.tangent[len(ridge.tangent) // 2]
-    along = chord - normal * (chord @ normal)
-    if np.linalg.norm(along) < 0.5 * np.linalg.norm(chord):
-        along = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    along, normal = direction_at(face, ridge, at)
     angle = np.radians(turn)
     return np.asarray(np.cos(angle) * along + np.sin(angle) * np.cross(normal, along))
 

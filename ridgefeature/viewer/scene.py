@@ -75,6 +75,7 @@ class Scene:
 
     def show_points(self, points: Array) -> None:
         """The scan (n, 3); nothing else is shown any more, and the camera looks at all of it."""
+        self._only_part = False
         self.renderer.RemoveAllViewProps()
         self._actors.clear()
         self.still = points[thinned(len(points), STILL)]

@@ -12,7 +12,7 @@ from typing import Any
 
 from ridgefeature.scan import MILLIMETRES
 from ridgefeature.viewer.guard import LOOPBACK, add_headers, guard
-from ridgefeature.viewer.page import TOLD, Page
+from ridgefeature.viewer.page import HINT, TOLD, Page
 from ridgefeature.viewer.routes import routes
 from ridgefeature.viewer.scene import Scene
 from ridgefeature.viewer.sizes import FIELDS
@@ -64,10 +64,11 @@ def serve(
             asyncio.get_running_loop().set_exception_handler(_unless_gone)
             try:
                 await _opened(work, scan, unit, lambda: ready(f"http://{host}:{server.port}/?token={token}"))
-                await work.warm()
-            except (ValueError, OSError) as error:
+            except Exception as error:  # whatever it is, there is no page to tell it on
                 wrong.append(error)
                 await server.stop()
+                return
+            await work.warm()
 
         server.controller.on_server_bind.add(bind)
         server.controller.on_server_ready.add_task(begun)
@@ -179,14 +180,16 @@ def _unless_gone(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> No
 
 def _told(page: Page, what: Callable[..., None], *values: Any) -> None:
     """Done; what was wrong with it is told on the page, until something goes right."""
-    wrong = page.tell.bad
+    told, wrong = page.tell.hint, page.tell.bad
+    quiet = what in (page.hover, page.away, page.point, page.rest)
+    page.tell.bad = wrong and quiet
     try:
         what(*values)
     except (ValueError, TypeError, KeyError) as error:
         page.say(str(error), bad=True)
     else:
-        if wrong and what not in (page.hover, page.away, page.point, page.rest):
-            page.right()
+        if wrong and not quiet and not page.tell.bad and page.tell.hint == told:
+            page.say("" if page.tell.pasting else HINT)
 
 
 async def _reported(page: Page, what: Callable[..., Any], *values: Any) -> None:

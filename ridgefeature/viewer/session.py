@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature.curvilinear import local_coordinates
+from ridgefeature.medians import median
 from ridgefeature.ridge import Ridge
 
 Array = NDArray[np.float64]
@@ -20,8 +21,10 @@ LEAST, MOST = 0.2, 3.0
 """Rates of height and width that sliders reach."""
 _PLACES, _MOST_OF_IT = 20, 0.8
 """Places of a ridge that are looked at, and the share of them that lie on another where that is the same."""
+_AS_WIDE = 1.5
+"""How many times as wide it may be."""
 PAUSE = 1.0
-"""Seconds."""
+"""Seconds between two changes of one value after which they are two steps."""
 _ON = 0.4
 """Distance from a spine, in widths, up to which a place is on its ridge."""
 
@@ -92,7 +95,11 @@ class Session:
         middles = ridge.spine + 0.5 * ridge.height[:, None] * ridge.normal
         at = np.linspace(0, len(middles) - 1, _PLACES + 2).astype(int)[1:-1]
         name, count = Counter(self.at(place) for place in middles[at]).most_common(1)[0]
-        return name if count > _MOST_OF_IT * _PLACES else None
+        if name is None or count <= _MOST_OF_IT * _PLACES:
+            return None
+        known = self[name].registered
+        wider = median(ridge.width) / median(known.width)
+        return name if ridge.groove == known.groove and 1 / _AS_WIDE < wider < _AS_WIDE else None
 
     def added(self, registered: Ridge, pick: tuple[float, float, float]) -> Session:
         """With one more ridge, chosen, by the first free name."""

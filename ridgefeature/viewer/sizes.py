@@ -58,20 +58,20 @@ class Sizes:
             return
         rate, limits = what[0], _reach(feature, what[0])
 
-        def off(to: float) -> float:
+        def largest(to: float) -> float:
             changed = feature.begun.resized(**{rate: to}, between=feature.between)
-            return _largest(getattr(changed, what), feature) - value
+            return _largest(getattr(changed, what), feature)
 
-        low, high = sorted(value + off(limit) for limit in limits)
+        low, high = sorted(map(largest, limits))
         if low == high:
             return
         if not low - _ROUNDED * abs(low) <= value <= high + _ROUNDED * abs(high):
             got = "no number" if np.isnan(value) else f"{value:g}"
             raise ValueError(f"{what}: expected {low:.4g} to {high:.4g} {self.page.tell.unit}, got {got}")
         if low < value < high:
-            self.slide(rate, float(brentq(off, *limits, xtol=1e-12)))
+            self.slide(rate, float(brentq(lambda to: largest(to) - value, *limits, xtol=1e-12)))
         else:
-            self.slide(rate, min(limits, key=lambda limit: abs(off(limit))))
+            self.slide(rate, min(limits, key=lambda limit: abs(largest(limit) - value)))
 
     def edited(self, told: dict[str, Any]) -> bool:
         """Fields of the page, FIELDS, as they are now; whether one was changed there: the first counts."""

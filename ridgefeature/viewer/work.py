@@ -30,9 +30,9 @@ _EVERY, _FIRST = 0.03, 0.01
 
 
 _SETTLES = 0.4
-"""Seconds without a template after which a march has come to its end."""
+"""Seconds without a template after which a march is taken to have come to its end."""
 MARCHING = "Marching"
-"""What the page tells as long as a march can be stopped."""
+"""What the page tells as long as templates are added."""
 
 
 class Work:
@@ -125,6 +125,7 @@ class Work:
 
     async def _register(self, march: March) -> None:
         page, shown, last = self.page, 0, time.monotonic()
+        page.tell.marching = True
         task = asyncio.ensure_future(aside(march.run))
         while not task.done():
             await asyncio.wait({task}, timeout=_EVERY if shown else _FIRST)
@@ -140,6 +141,7 @@ class Work:
                 with page.tell:
                     page.tell.busy, page.tell.count = MARCHING, shown
                 page.draw()
+        page.tell.marching = False
         page.scene.hide("template ")
         page.scene.coarse(False)
         try:
