@@ -25,6 +25,7 @@ from cad_export.room import told_if_too_small
 from cad_export.site import Site
 from cad_export.strip import OffFaceError
 from ridgefeature.fitting import FITS
+from ridgefeature.folds import folds
 from ridgefeature.on_base import surfaces_on
 from ridgefeature.ridge import Ridge
 from ridgefeature.scan import millimetres_per
@@ -71,7 +72,7 @@ def paste(
     chosen = chosen_face(solid, face, path, at, size)
     by = "face" if face is not None else "host" if at is None else "at"
     lay = partial(_stand, ridge, chosen, path, at, direction, fit, scale, mirror, reverse, w)
-    with told_if_too_small(solid, chosen, size if path is None else None, by):
+    with _fold_told(ridge, path), told_if_too_small(solid, chosen, size if path is None else None, by):
         stand, result, grown, told = _pasted(solid, lay, h, w, check)
     if report is not None:
         report.update(asdict(told))
@@ -95,6 +96,22 @@ def _pasted(
         site = _site(solid, stand, h, w)  # what it says of h and w holds on any face
         with _instead(error):
             return stand, *inset_at(solid, site, h, check)
+
+
+@contextmanager
+def _fold_told(ridge: Ridge, path: Any) -> Iterator[None]:
+    """Where a ridge that folds over itself cannot be pasted along its own shape, that is told, too."""
+    try:
+        yield
+    except ValueError as error:
+        found = folds(ridge) if path is None else ()
+        if not found:
+            raise
+        where = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in found)
+        raise ValueError(
+            f"ridge: it folds over itself at arc length {where} {ridge.unit}; cut it there first, by "
+            f'ridge.stretched(length, "trim"). What came of it: {error}'
+        ) from error
 
 
 @dataclass(frozen=True, eq=False)

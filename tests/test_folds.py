@@ -84,3 +84,17 @@ def test_a_doubt_of_the_whole_ridge_stays_first() -> None:
     whole, part = (0.0, ridge.length, "missed"), (0.0, 4.0, "unseen")
     found = with_folds((whole, part), ridge)
     assert found[:2] == (whole, part) and found[2][2] == WHY
+
+
+def test_what_cannot_be_pasted_for_its_own_fold_says_so_and_goes_where_it_is_cut() -> None:
+    ridge, host = hooked(4.0), cq.Workplane().box(200, 200, 20)
+    with pytest.raises(
+        ValueError, match=r"folds over itself at arc length .* to 60 mm; cut it there"
+    ) as told:
+        cx.paste(ridge, host, face=">Z")
+    assert told.value.__cause__ is not None
+    cut = ridge.stretched(49.0, "trim")
+    assert folds(cut) == () and cx.paste(cut, host, face=">Z").isValid()
+    with pytest.raises(ValueError, match="leaves the face") as other:
+        cx.paste(cut, host, face=">Z", at=(99.0, 99.0, 10.0))
+    assert "folds" not in str(other.value)
