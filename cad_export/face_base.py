@@ -245,14 +245,15 @@ def direction_at(face: Any, ridge: Ridge, at: Any) -> tuple[Floats, Floats]:
     return _own_direction(host, place, normal, _mean(ridge)[1]), normal
 
 
-def _mean(ridge: Ridge) -> tuple[Floats, Floats]:
-    """A ridge's mean direction, unrolled (2,) and in space (3,); in its middle, where it has none."""
+def _mean(ridge: Ridge) -> tuple[Floats, Floats, Floats]:
+    """A ridge's mean direction, unrolled (2,) and in space (3,), in its middle where it has none; and the
+    angles (k,) of its path, unrolled."""
     points, angles = developed(ridge)
     mean, chord = points[-1] - points[0], ridge.spine[-1] - ridge.spine[0]
     if np.linalg.norm(mean) < 0.1 * ridge.length:  # a ring or a spiral
         middle = len(ridge.arc_length) // 2
         mean, chord = np.array([np.cos(angles[middle]), np.sin(angles[middle])]), ridge.tangent[middle]
-    return mean, chord
+    return mean, chord, angles
 
 
 def _own_direction(host: Host, place: Floats, normal: Floats, chord: Floats) -> Floats:
@@ -264,7 +265,7 @@ def _own_direction(host: Host, place: Floats, normal: Floats, chord: Floats) -> 
 
 def _tangent(host: Host, ridge: Ridge, place: Floats, direction: Any, reverse: bool) -> Floats:
     """The path's tangent (3,) in the middle of the ridge, for its mean direction to lie along `direction`."""
-    mean, chord = _mean(ridge)
+    mean, chord, angles = _mean(ridge)
     normal = host.frame(place[0], place[1])[1]
     if direction is None:
         along_face = _own_direction(host, place, normal, chord)
@@ -275,7 +276,6 @@ def _tangent(host: Host, ridge: Ridge, place: Floats, direction: Any, reverse: b
             what = "one along the face's normal" if given.any() else "a zero vector"
             raise ValueError(f"direction: expected one along the face, got {what}; choose another")
     ahead = along_face / np.linalg.norm(along_face) * (-1 if reverse else 1)
-    angles = developed(ridge)[1]
     turn = float(np.interp(0.5 * ridge.length, ridge.arc_length, angles) - np.arctan2(mean[1], mean[0]))
     return np.cos(turn) * ahead + np.sin(turn) * np.cross(normal, ahead)
 

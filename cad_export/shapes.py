@@ -17,7 +17,6 @@ from cad_export.occt_arrays import pole_array
 from cad_export.record import record_of
 from cad_export.slab import make_slab
 from ridgefeature.bspline import Surface
-from ridgefeature.scan import millimetres_per
 
 
 def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1, unit: str | None = None) -> cq.Face:
@@ -30,6 +29,8 @@ def face(ridge: RidgeLike | Surface, h: float = 1, w: float = 1, unit: str | Non
     """
     surface = checked_surface(ridge, h, w)
     if unit is not None:
+        from ridgefeature.scan import millimetres_per  # brings compiled code, which most exports do without
+
         factor = millimetres_per(getattr(ridge, "unit", unit)) / millimetres_per(unit)
         surface = surface if factor == 1 else replace(surface, poles=factor * surface.poles)
     made = make_face(surface)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ridgefeature.asked import refusal
-from ridgefeature.curvilinear import local_coordinates
+from ridgefeature.doubts import is_beside, place_of_pick
 from ridgefeature.march import INTERRUPTED
 from ridgefeature.medians import median
 from ridgefeature.ridge import Ridge
@@ -23,8 +23,8 @@ _BESIDE_IT = -1, 1, -0.5, 0.5, -2, 2
 """Steps of it from the width of a ridge that has the pick at its foot, at which the one that is meant is."""
 _FOOT, _CREST = 0.45, 0.3
 """Distances from the spine in widths: at the foot; on the crest."""
-_BEYOND, _OFF = 0.3, 0.3
-"""Distance past an end, in widths, and from the surface, in heights, up to which a pick is on a ridge."""
+_OFF = 0.3
+"""Distance from the surface, in heights, up to which a pick is on a ridge."""
 _ALIKE, _SURE = 0.1, 2
 """Relative difference below which two ridges are the same; how often the same one settles it."""
 _AS_LONG = 0.5
@@ -110,11 +110,10 @@ def _same(one: Ridge, other: Ridge) -> bool:
 
 def _has_pick(ridge: Ridge, aside: float) -> bool:
     """Whether the pick lies on the surface and between the ends, and no more widths aside of the spine."""
-    s, y, z = (float(x[0]) for x in local_coordinates(ridge, ridge.pick[None]))
-    width = float(np.interp(s, ridge.arc_length, ridge.width))
-    beyond = 0.0 if ridge.closed else max(-s, s - ridge.length)
-    if abs(y) > aside * width or beyond > _BEYOND * width:
+    s, y, z = place = place_of_pick(ridge)
+    if not is_beside(ridge, place, aside):
         return False
+    width = float(np.interp(s, ridge.arc_length, ridge.width))
     off = _OFF * median(np.abs(ridge.height))
     under = float(np.interp(s, ridge.arc_length, ridge.height) * ridge.section(np.array(y / width)))
     # Straight up is no nearer than the surface, whose distance takes long. There is none past an end.

@@ -55,13 +55,18 @@ class RuledBase:
 
     def __call__(self, s: Array, y: Array) -> tuple[Array, Array]:
         """Points and unit normals (k, m, 3) at s (k,), y (k, m)."""
+        spine, left, normal, curvature = self.frames(s)
+        if curvature.any():
+            return self._arcs(spine, left, normal, curvature[:, None], y)
+        points = spine[:, None] + y[..., None] * left[:, None]
+        return points, np.broadcast_to(normal[:, None], points.shape)
+
+    def frames(self, s: Array) -> tuple[Array, Array, Array, Array]:
+        """Spine, unit vectors to the left and along the normal (k, 3 each), and curvature (k,), at s (k,)."""
         spread = along(self.arc_length, np.eye(len(self.arc_length)), s, closed=self.closed)
         left = unit(spread @ np.cross(self.normal, self.tangent))
-        normal = unit(spread @ self.normal)
-        if self.curvature is not None and self.curvature.any():
-            return self._arcs(spread @ self.spine, left, normal, (spread @ self.curvature)[:, None], y)
-        points = (spread @ self.spine)[:, None] + y[..., None] * left[:, None]
-        return points, np.broadcast_to(normal[:, None], points.shape)
+        curvature = np.zeros(len(s)) if self.curvature is None else spread @ self.curvature
+        return spread @ self.spine, left, unit(spread @ self.normal), curvature
 
     @staticmethod
     def _arcs(spine: Array, left: Array, normal: Array, curvature: Array, y: Array) -> tuple[Array, Array]:

@@ -82,13 +82,26 @@ def to_one_side(ridge: Ridge, edges: Array, s: Array, across: Array, side: Array
 
 def pick_missed(ridge: Ridge) -> tuple[float, float] | None:
     """How far the pick lies from the spine, in the unit and in widths; None where it is on the ridge."""
-    s, y, _ = (float(x[0]) for x in local_coordinates(ridge, ridge.pick[None]))
-    width = float(np.interp(s, ridge.arc_length, ridge.width))
-    beyond = 0.0 if ridge.closed else max(-s, s - ridge.length)
-    if abs(y) <= (0.5 + _ASIDE) * width and beyond <= _BEYOND * width:
+    s, _, _ = place = place_of_pick(ridge)
+    if is_beside(ridge, place, 0.5 + _ASIDE):
         return None
     far = float(np.linalg.norm(ridge.spine - ridge.pick, axis=1).min())
-    return far, far / width
+    return far, far / float(np.interp(s, ridge.arc_length, ridge.width))
+
+
+def place_of_pick(ridge: Ridge) -> tuple[float, float, float]:
+    """Arc length of the pick, distance to the left of the spine and height, in the station's frame."""
+    s, y, z = (float(x[0]) for x in local_coordinates(ridge, ridge.pick[None]))
+    return s, y, z
+
+
+def is_beside(ridge: Ridge, place: tuple[float, float, float], aside: float) -> bool:
+    """Whether a place is at most so many widths aside of the spine, and no further past an end than a pick
+    may be."""
+    s, y, _ = place
+    width = float(np.interp(s, ridge.arc_length, ridge.width))
+    beyond = 0.0 if ridge.closed else max(-s, s - ridge.length)
+    return abs(y) <= aside * width and beyond <= _BEYOND * width
 
 
 def _about(at: NDArray[np.intp], count: int) -> Array:

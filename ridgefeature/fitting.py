@@ -108,6 +108,11 @@ def joined(ridge: Ridge) -> Ridge:
     return replace(ridge, closed=True, **changes)
 
 
+def room_for_width(ridge: Ridge) -> Array:
+    """(k,) the largest rate of the width at each station that leaves the feet on the flanks."""
+    return np.asarray(ridge.border / LEAST_BORDER / ridge.width)
+
+
 def check_widths(ridge: Ridge, width: Array, rate: float | None, blend: Array) -> None:
     """Raise ValueError unless these widths (k,) are above 0 and within the flanks.
 
@@ -125,7 +130,7 @@ def check_widths(ridge: Ridge, width: Array, rate: float | None, blend: Array) -
     most, got = room[i], width[i]
     if rate is not None:
         with np.errstate(divide="ignore", invalid="ignore"):
-            rates = 1 + np.where(blend > 0, (room / ridge.width - 1) / blend, np.inf)
+            rates = 1 + np.where(blend > 0, (room_for_width(ridge) - 1) / blend, np.inf)
         most, got = float(rates.min()), rate
     # Rounded down, so that what is told is allowed.
     digits = 10.0 ** (3 - math.floor(math.log10(most)))

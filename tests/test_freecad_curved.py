@@ -17,8 +17,8 @@ from oracles import spiral_ridge
 
 import ridgefeature as rf
 from cad_export.freecad import write_macro
-from cad_export.freecad.affine import largest_width
 from cad_export.freecad.curved import LEAST_WIDTH
+from ridgefeature.fitting import room_for_width
 from ridgefeature.on_base import knot_changes
 
 EXACT = 1e-12
@@ -59,6 +59,11 @@ def ring() -> rf.Ridge:
     )
 
 
+def largest(ridge: rf.Ridge) -> float:
+    """The largest rate of the width."""
+    return float(room_for_width(ridge).min())
+
+
 RIDGES = {f.__name__: f for f in (spiral, slightly_bent, ring)}
 
 
@@ -89,13 +94,13 @@ def check(ridge: rf.Ridge, shape: Any, h: float, w: float) -> None:
 @settings(max_examples=30, deadline=None)
 def test_the_macro_makes_the_ridges_own_poles(made: Any, h: float, part: float) -> None:
     ridge, stub = made
-    w = LEAST_WIDTH + part * (largest_width(ridge) - LEAST_WIDTH)
+    w = LEAST_WIDTH + part * (largest(ridge) - LEAST_WIDTH)
     check(ridge, shape_at(stub, h, w), h, w)
 
 
 def test_knots_change_where_it_is_told(made: Any) -> None:
     ridge, stub = made
-    changes = knot_changes(ridge, LEAST_WIDTH, largest_width(ridge))
+    changes = knot_changes(ridge, LEAST_WIDTH, largest(ridge))
     assert (np.diff(changes) > 0).all()
     for w in (*changes, 1.0):
         for rate in (w * (1 - 1e-9), w * (1 + 1e-9)):
@@ -107,8 +112,8 @@ def test_knots_change_where_it_is_told(made: Any) -> None:
 
 def test_rates_that_it_cannot_make_are_refused_and_the_shape_stays(made: Any) -> None:
     ridge, stub = made
-    good = shape_at(stub, 1.0, largest_width(ridge) * (1 - 1e-9))
-    for w in (0.0, -1.0, LEAST_WIDTH, math.nan, largest_width(ridge) * (1 + 1e-9)):
+    good = shape_at(stub, 1.0, largest(ridge) * (1 - 1e-9))
+    for w in (0.0, -1.0, LEAST_WIDTH, math.nan, largest(ridge) * (1 + 1e-9)):
         with pytest.raises(ValueError, match=f"Width: expected a rate above {LEAST_WIDTH:g} and at most"):
             shape_at(stub, 1.0, w)
         assert stub.Shape is good

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ridgefeature import Ridge
-from ridgefeature.merge import LEAST_BORDER
+from ridgefeature.fitting import room_for_width
 
 Array = NDArray[np.float64]
 
@@ -33,11 +33,6 @@ class AffinePoles:
         return self.fixed + h * self.per_height + w * self.per_width
 
 
-def largest_width(ridge: Ridge) -> float:
-    """The largest rate of the width that leaves the feet on the flanks."""
-    return float((ridge.border / LEAST_BORDER / ridge.width).min())
-
-
 def affine_poles(ridge: Ridge) -> AffinePoles:
     """The ridge's poles taken apart, from its own surface at a few rates, and held against it at others.
 
@@ -45,8 +40,13 @@ def affine_poles(ridge: Ridge) -> AffinePoles:
     """
     flat = ridge.resized(h=0, w=1).surface().poles
     slim = ridge.resized(h=0, w=0.5).surface().poles
+    if slim.shape != flat.shape:
+        raise ValueError(
+            f"expected poles that are affine in h and w, got {flat.shape[1]} across at w=1 and "
+            f"{slim.shape[1]} at w=0.5: the ridge stands on a curved base; take its curved_surface"
+        )
     per_width = 2 * (flat - slim)
-    largest = largest_width(ridge)
+    largest = float(room_for_width(ridge).min())
     poles = AffinePoles(flat - per_width, ridge.surface().poles - flat, per_width, largest)
     allowed = TOLERANCE * float(np.abs(poles.fixed).max())
     for h, w in ((1.0, 1.0), (-1.5, 0.25), (3.0, largest * (1 - TOLERANCE))):

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cad_export.freecad.affine import largest_width
 from ridgefeature import Ridge
+from ridgefeature.base import registered_base
 from ridgefeature.basis import basis_matrix
+from ridgefeature.fitting import room_for_width
 from ridgefeature.merge import DEGREE, along
 from ridgefeature.on_base import knot_changes
 from ridgefeature.scan import millimetres_per
-from ridgefeature.stations import unit
 
 Array = NDArray[np.float64]
 
@@ -30,29 +30,23 @@ def curved_surface(ridge: Ridge) -> dict[str, Any]:
     knots across, for rates of the width up to `up_to`; they are the ridge's own, which change with the octave
     of the flanks. seam: what the poles of a ring fulfil besides: one row of factors for each condition.
     """
-    surface, factor = ridge.surface(), millimetres_per(ridge.unit)
+    surface, factor, base = ridge.surface(), millimetres_per(ridge.unit), registered_base(ridge)
     poles = len(surface.knots_u) - DEGREE - 1
-    closed = bool(np.array_equal(surface.poles[0], surface.poles[-1]))
-    n = poles - 2 if closed else poles
-    parts, length = np.linspace(0.0, 1.0, n), ridge.length
-    spread = along(
-        np.linspace(0.0, 1.0, len(ridge.arc_length)), np.eye(len(ridge.arc_length)), parts, 0, closed
-    )
-    frames = {
-        "spine": factor * (spread @ ridge.spine),
-        "left": unit(spread @ np.cross(ridge.normal, ridge.tangent)),
-        "normal": unit(spread @ ridge.normal),
-        "curvature": spread @ ridge.curvature / factor,
+    sites = np.linspace(0.0, ridge.length, poles - 2 if base.closed else poles)
+    spine, left, normal, curvature = base.frames(sites)
+    frames = {"spine": factor * spine, "left": left, "normal": normal, "curvature": curvature / factor}
+    sizes = {
+        name: factor * along(ridge.arc_length, getattr(ridge, name), sites, closed=base.closed)
+        for name in ("height", "width", "border")
     }
-    sizes = {name: factor * (spread @ getattr(ridge, name)) for name in ("height", "width", "border")}
     return {
         "rows": {name: values.tolist() for name, values in (frames | sizes).items()},
-        "sites": (parts * length).tolist(),
-        "seam": _seam(surface.knots_u, length).tolist() if closed else [],
+        "sites": sites.tolist(),
+        "seam": _seam(surface.knots_u, ridge.length).tolist() if base.closed else [],
         "section": ridge.section.coefficients.tolist(),
         "pieces": _pieces(ridge),
         "least_width": LEAST_WIDTH,
-        "largest_width": largest_width(ridge),
+        "largest_width": float(room_for_width(ridge).min()),
     }
 
 
@@ -64,7 +58,7 @@ def _seam(knots: Array, length: float) -> Array:
 
 def _pieces(ridge: Ridge) -> list[dict[str, Any]]:
     """Knots across by rates of the width, from the slimmest to the broadest."""
-    most = largest_width(ridge)
+    most = float(room_for_width(ridge).min())
     ends = [LEAST_WIDTH, *knot_changes(ridge, LEAST_WIDTH, most).tolist(), most]
     pieces = []
     for low, high in pairwise(ends):

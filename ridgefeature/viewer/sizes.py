@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from ridgefeature.merge import LEAST_BORDER
+from ridgefeature.fitting import room_for_width
 from ridgefeature.readable import reason
 from ridgefeature.viewer import curves
 from ridgefeature.viewer.session import LEAST, MOST, Feature
@@ -145,7 +145,7 @@ def _reach(feature: Feature, rate: str) -> tuple[float, float]:
         return LEAST, MOST
     begun, low, high = feature.begun, *(feature.between or (-np.inf, np.inf))
     inside = (begun.arc_length >= low) & (begun.arc_length <= high)
-    room = float((begun.border / (LEAST_BORDER * begun.width))[inside].min())
+    room = float(room_for_width(begun)[inside].min())
     return LEAST, float(np.clip(np.floor(100.0 * room * (1 - 1e-9)) / 100.0, 1.0, MOST))
 
 
