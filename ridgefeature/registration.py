@@ -29,7 +29,7 @@ from ridgefeature.starts import Hints
 from ridgefeature.stations import lay_out
 from ridgefeature.template import STEEP, Template
 from ridgefeature.valley import fitted_over_ground
-from ridgefeature.verdict import fin, no_ridge, too_large, unknown_height, unsound
+from ridgefeature.verdict import no_ridge, no_whole_ridge, too_large
 from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
@@ -81,13 +81,13 @@ def register(
 
     def attempt(hints: Hints, reach: float, aimed: bool = True, high: bool = False) -> Ridge:
         track = _track(rough, full, pick, extent, hints, settings, progress, reach, aimed, high)
-        return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick)
+        return _constructed(rough, full, _directed(track, pick, hints), settings, scan, pick, extent)
 
     return warned(ridge_meant(attempt, extent, hints), pick, direction)
 
 
 def _constructed(
-    rough: Window, full: Window, track: Track, settings: Settings, scan: Scan, pick: Array
+    rough: Window, full: Window, track: Track, settings: Settings, scan: Scan, pick: Array, extent: float
 ) -> Ridge:
     """The ridge of a settled march: fitted as a whole, where templates are fitted by residuals."""
     section, intervals, grid = track.templates[0].section, None, full.grid
@@ -100,11 +100,7 @@ def _constructed(
         section = section if found.joint is None else found.joint.section
         if found.closed:
             closed, stop = True, (CLOSED, CLOSED)
-        why = (
-            unsound(found.sound, track)
-            or unknown_height(stations)
-            or fin(stations.height, median(stations.width), settings)
-        )
+        why = no_whole_ridge(found.sound, stations, stop, extent, settings)
         if why:
             raise RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", track.templates[0].width)
     return Ridge(
@@ -151,7 +147,8 @@ def _track(
     track = place_ends(full, track, settings)
     track = _on_base(rough, full, settle(full, track, settings), settings)
     track = finish_ends(full, track, settings)
-    why = too_large(track, extent, settings)
+    height, width = (np.array([getattr(t, name) for t in track.templates]) for name in ("height", "width"))
+    why = too_large(height, width, extent, settings)
     if why:
         raise RefusedError(f"no ridge at {text_of(pick)}: {why}; {_ADVICE}", first.width, True)
     why = no_ridge(rough, track, pick, settings)

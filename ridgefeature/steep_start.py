@@ -27,7 +27,7 @@ def _topped(points: Array, terms: Array, section: Section) -> Array:
     """
     place = points[:, 0].astype(np.int64)
     eta = (points[:, 1] - terms[place, E]) / terms[place, W]
-    on = np.abs(eta) < _ABOUT * section.half_height_width
+    on = (np.abs(eta) < _ABOUT * section.half_height_width) & (terms[place, H] != 0)
     if not on.any():
         return terms
     out = terms.copy()

@@ -14,21 +14,27 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 
-_FEW = 200
-"""Points of templates that may be too few for a whole fit."""
 _UNKNOWN = 0.5
 """Standard deviation of the height, in heights, beyond which most of a ridge is not told from its base."""
 
 
-def too_large(track: Track, extent: float, settings: Settings) -> str:
-    """Why what was found is as wide as the scan, or a mere fin; empty if it is neither."""
-    width = median([t.width for t in track.templates])
-    if width > settings.widest * extent:
-        return f"what rises there is {width:.4g} wide, on a scan of about {extent:.4g}"
-    return fin(np.array([t.height for t in track.templates]), width, settings)
+def too_large(height: Array, width: Array, extent: float, settings: Settings) -> str:
+    """Why heights and widths (n,) are those of the scan itself, or of a mere fin; empty if of neither."""
+    usual = median(width)
+    if usual > settings.widest * extent:
+        return f"what rises there is {usual:.4g} wide, on a scan of about {extent:.4g}"
+    return _fin(height, usual, settings)
 
 
-def fin(height: Array, width: float, settings: Settings) -> str:
+def too_short(length: float, width: Array, stop: tuple[str, str], settings: Settings) -> str:
+    """Why what ends at both ends is too short for a ridge of widths (n,); empty if it is not."""
+    usual = median(width)
+    if any(why.startswith(GOES_ON) for why in stop) or length >= settings.shortest * usual:
+        return ""
+    return f"what rises there is {length:.4g} long and {usual:.4g} wide"
+
+
+def _fin(height: Array, width: float, settings: Settings) -> str:
     """Why heights on so wide a foot are a mere fin's, as of an edge that is taken for a ridge; else empty."""
     usual = median(np.abs(height))
     return (
@@ -45,11 +51,10 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings)
     longer than wide.
     """
     templates = track.templates
-    width = median([t.width for t in templates])
-    whole = not any(why.startswith(GOES_ON) for why in track.stop)
-    length = sum(t.length for t in templates)
-    if whole and length < settings.shortest * width:
-        return f"what rises there is {length:.4g} long and {width:.4g} wide"
+    width = np.array([t.width for t in templates])
+    why = too_short(sum(t.length for t in templates), width, track.stop, settings)
+    if why:
+        return why
     order = sorted(templates, key=lambda t: float(np.linalg.norm(t.position - pick)))
     evidence = 0.0
     for template in order:
@@ -59,14 +64,21 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings)
     return f"a smooth surface or an edge explains it as well (evidence {evidence:.1f})"
 
 
-def unsound(sound: bool, track: Track) -> str:
-    """Why templates that no fit of the whole holds together are no ridge; empty if one does.
+def no_whole_ridge(
+    sound: bool, stations: Stations, stop: tuple[str, str], extent: float, settings: Settings
+) -> str:
+    """Why what was fitted as a whole is no ridge, though its templates looked like one; empty if it is one.
 
-    Each may explain its window, as about a body that bends away on all sides. Few points tell no whole fit.
+    sound: whether a fit of the whole holds the templates together. Each may explain its window, as about a
+    body that bends away on all sides.
     """
-    if sound or sum(t.points for t in track.templates) < _FEW:
-        return ""
-    return "no ridge goes through all of what was found there"
+    if not sound:
+        return "no ridge goes through all of what was found there"
+    return (
+        unknown_height(stations)
+        or too_large(stations.height, stations.width, extent, settings)
+        or too_short(stations.arc_length[-1] - stations.arc_length[0], stations.width, stop, settings)
+    )
 
 
 def unknown_height(stations: Stations) -> str:

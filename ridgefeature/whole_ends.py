@@ -106,13 +106,15 @@ def _end_of(
     ahead: float,
     kept: float,
 ) -> float:
-    """Where a ridge ends whose last end is known to be near `end`.
+    """Where a ridge ends whose last end is known to be near `end`; there if nothing is left of it by then.
 
     shown: evidence and height of windows of one width and of a half; kept: a place that is on the ridge.
     """
     path, known = joint.path, end
     one, near = min(NODES_A_WIDTH, len(path.at) - 2), max(round(_NEAR * NODES_A_WIDTH), 1)
     inside = (path.at >= start) & (path.at <= end)
+    if not inside.any():
+        return end
     low, high = (int(k) for k in np.flatnonzero(inside)[[0, -1]])
     count = windows(joint.counts, near)
     dense = count > _DENSE * median(count[inside[:-near]])

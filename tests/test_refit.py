@@ -20,6 +20,7 @@ from ridgefeature.refit import refitted
 from ridgefeature.section import Section, bell, cosine, plateau
 from ridgefeature.settings import Settings
 from ridgefeature.stations import lay_out
+from ridgefeature.whole_ends import ends_of
 
 LEAN = 0.12
 
@@ -141,6 +142,17 @@ def test_widths_are_never_negative_whatever_a_fit_says():
     assert joint is not None
     turned = replace(joint, smooth=joint.smooth.changed(np.diag([1.0, 1.0, 1.0, 1.0, 1.0, -1.0])))
     assert (stations_of(turned, 41, Settings()).width > 0).all()
+
+
+def test_nothing_is_left_of_a_ridge_that_ends_before_it_starts():
+    """So its ends are told of a fit that is no ridge's: they stay, for the caller to refuse."""
+    joint = refitted(
+        build_grid(spiral_points(3000)), spiral_ridge(), bell(), False, (False, False), Settings()
+    ).joint
+    assert joint is not None
+    start, end = 0.5001 * joint.path.at[-1], 0.5 * joint.path.at[-1]
+    assert not ((joint.path.at > end) & (joint.path.at < start)).any()
+    assert ends_of(joint, joint, start, end, (True, True), 1.0) == (start, end)
 
 
 # Sections
