@@ -115,7 +115,7 @@ def _markup(server: Any, scene: Scene, files: list[str]) -> Any:
     from trame.widgets import html
     from trame.widgets import vtk as vtk_widgets
 
-    own = {"naming": "", "new_name": "", "units": list(MILLIMETRES), "trame__title": "ridgefeature"}
+    own = {"naming": "", "units": list(MILLIMETRES), "trame__title": "ridgefeature"}
     server.state.update(TOLD | own | {"files": files})
     server.enable_module(
         {"serve": {"own": str(_HERE / "assets")}, "scripts": ["own/page.js"], "styles": ["own/page.css"]}

@@ -88,11 +88,10 @@
     if (!on(e, "input, select, textarea") && anywhere[e.key]) tell(...anywhere[e.key]);
   }, true);
 
-  // A name that is to be another is there to be typed over.
+  // After a ridge has another name its place in the list is where the keys go.
   document.addEventListener("focusout", (e) => {
     if (e.target.id === "new-name" && !e.relatedTarget) setTimeout(() => document.querySelector(".ridge.chosen .name")?.focus());
   });
-  document.addEventListener("focusin", (e) => { if (e.target.id === "new-name") setTimeout(() => e.target.select()); });
 
   // Files: dropped on the page, or chosen.
   const leaves = (name) => !document.querySelector(".ridge")
