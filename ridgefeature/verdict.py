@@ -14,6 +14,9 @@ from ridgefeature.window import Window
 
 Array = NDArray[np.float64]
 
+_ERRATIC, _FEWEST = 0.3, 4
+"""Change of the width, as a logarithm, from template to template from which on they follow no ridge; and the
+fewest templates that tell it: those of ridges differ by up to 0.2."""
 _UNKNOWN = 0.5
 """Standard deviation of the height, in heights, beyond which most of a ridge is not told from its base."""
 
@@ -34,6 +37,14 @@ def too_short(length: float, width: Array, stop: tuple[str, str], settings: Sett
     return f"what rises there is {length:.4g} long and {usual:.4g} wide"
 
 
+def erratic(width: Array) -> str:
+    """Why templates of widths (n,), in their order, follow no ridge but one thing after another; else empty."""
+    change = median(np.abs(np.diff(np.log(width)))) if len(width) >= _FEWEST else 0.0
+    if change <= _ERRATIC:
+        return ""
+    return f"what rises there changes its width by {np.expm1(change):.0%} from template to template"
+
+
 def _fin(height: Array, width: float, settings: Settings) -> str:
     """Why heights on so wide a foot are a mere fin's, as of an edge that is taken for a ridge; else empty."""
     usual = median(np.abs(height))
@@ -52,7 +63,7 @@ def no_ridge(window: Window, track: Track, pick: np.ndarray, settings: Settings)
     """
     templates = track.templates
     width = np.array([t.width for t in templates])
-    why = too_short(sum(t.length for t in templates), width, track.stop, settings)
+    why = too_short(sum(t.length for t in templates), width, track.stop, settings) or erratic(width)
     if why:
         return why
     order = sorted(templates, key=lambda t: float(np.linalg.norm(t.position - pick)))

@@ -21,7 +21,7 @@ from ridgefeature.march import GOES_ON
 from ridgefeature.section import bell
 from ridgefeature.settings import Settings
 from ridgefeature.stations import Stations
-from ridgefeature.verdict import no_whole_ridge, unknown_height
+from ridgefeature.verdict import erratic, no_whole_ridge, unknown_height
 
 FLAT = np.zeros(3)
 ENDS = ("the data end here", "no ridge: flat base")
@@ -215,6 +215,14 @@ def test_what_was_fitted_as_a_whole_is_asked_again(sound, size, stop, extent, sa
     why = no_whole_ridge(sound, fitted, stop, extent, Settings())
     assert says in why
     assert bool(says) == bool(why)
+
+
+def test_what_changes_its_width_from_template_to_template_is_no_ridge():
+    along = np.arange(12)
+    assert erratic(10 * 1.3**along) == "", "however broad it becomes"
+    assert erratic(np.where(along < 6, 10.0, 30.0)) == "", "once, where two bodies meet"
+    assert erratic(np.where(along[:3] % 2, 10.0, 15.0)) == "", "too few"
+    assert "by 50% from template to template" in erratic(np.where(along % 2, 10.0, 15.0))
 
 
 def test_a_base_that_explains_steep_flanks_away_is_not_taken():
