@@ -38,7 +38,7 @@ def too_short(length: float, width: Array, stop: tuple[str, str], settings: Sett
 
 
 def erratic(width: Array) -> str:
-    """Why templates of widths (n,), in their order, follow no ridge but one thing after another; else empty."""
+    """Why templates of widths (n,), in their order, follow several things and no ridge; empty if one does."""
     change = median(np.abs(np.diff(np.log(width)))) if len(width) >= _FEWEST else 0.0
     if change <= _ERRATIC:
         return ""
