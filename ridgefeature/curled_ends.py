@@ -34,6 +34,8 @@ def uncurled(spine: Array, normal: Array, height: Array, width: Array) -> Array:
 
 def _straight_start(spine: Array, normal: Array, height: Array, width: Array) -> Array:
     usual = median(width)
+    if not usual > 0:
+        return spine
     steps = np.linalg.norm(np.diff(spine, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)]) / usual
     inner = (along > _CAP) & (along < _IN)

@@ -20,7 +20,7 @@ _NEAR_ROUNDS, _ROUNDS = 5, 3
 """By the nearest places of a section, and as it is seen, of each of the states that a fit may begin with."""
 
 
-def _topped(points: Array, terms: Array, section: Section) -> Array:
+def topped(points: Array, terms: Array, section: Section) -> Array:
     """The terms (n, 6) with the height at which most points about the middle lie.
 
     Of a ridge that is taken for too high the points of the top are nearest to flanks: they would stay there.
@@ -42,7 +42,7 @@ def likeliest(task: Task, state: State) -> State | None:
     """
     task = task.thinned()
     points = task.some
-    state = state.given(state.section, _topped(points, state.terms, state.section))
+    state = state.given(state.section, topped(points, state.terms, state.section))
     best, kept = -np.inf, None
     for section in dict.fromkeys((state.section, box())):
         terms = with_half_height_width(state.terms, state.section, section)

@@ -58,6 +58,10 @@ def test_a_short_ridge_stays():
     np.testing.assert_array_equal(uncurled(given, UP[some], falling(4.0)[some], WIDE[some]), given)
 
 
+def test_what_has_no_width_stays():
+    np.testing.assert_array_equal(uncurled(path(0.0, 2.0), UP, falling(4.0), 0.0 * WIDE), path(0.0, 2.0))
+
+
 def test_a_rounded_end_that_was_seen_from_one_side_does_not_turn_the_path():
     random = np.random.default_rng(3)
     x, y = random.uniform([[-15.0], [-18.0]], [[60.0], [18.0]], (2, 40_000))

@@ -16,6 +16,7 @@ from ridgefeature.refit import refitted
 from ridgefeature.section import bell, box, plateau
 from ridgefeature.smearing import log_likelihood
 from ridgefeature.stations import Stations
+from ridgefeature.steep_start import topped
 
 HEIGHT, WIDTH = 12.0, 10.0
 
@@ -129,6 +130,17 @@ def test_without_rounds_there_is_the_start_of_a_steep_ridge_and_nothing_of_anoth
     told = rf.Settings(), None, 0
     assert fit_whole(grid, path_frame(straight(), False), plateau(), *told) is not None
     assert fit_whole(grid, path_frame(straight(height=3.0), False), plateau(), *told) is None
+
+
+def test_a_height_that_crosses_nothing_is_scaled_by_the_points_where_there_is_one():
+    """A fit of what is no ridge has such; its other places tell how high it is."""
+    one = terms()
+    one[:, [A, C, E]] = 0.0
+    one[:, H] = np.where(np.arange(len(one)) < 2, 0.0, 6.0)
+    place = np.repeat(np.arange(len(one)), 5).astype(float)
+    points = np.column_stack([place, np.zeros(len(place)), np.full(len(place), 9.0)])
+    found = topped(points, one, box())
+    np.testing.assert_allclose(found[:, H], 1.5 * one[:, H])
 
 
 def test_the_likelihood_does_not_depend_on_how_fine_its_quadrature_is():
