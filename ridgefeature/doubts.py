@@ -19,7 +19,7 @@ feet; and by how much their shares of strays may differ."""
 _TOGETHER, _FEW, _SURE = 5, 16, 3.0
 """Stretches whose strays are counted together; points on a side below which nothing is said of it; standard
 deviations that a difference of shares must have to spare."""
-_ASIDE, _BEYOND = 0.5, 0.3
+_ASIDE, _BEYOND = 0.5, 0.5
 """Widths beyond the feet, and beyond an end, from which on a pick is not on the ridge."""
 
 

@@ -86,8 +86,9 @@ def tube(seed: int, height: float, width: float = 6.0, noise: float = 0.03) -> n
 def test_vertical_walls_make_no_horns(height, seed):
     """No spline is as steep: the likeliest one would swing over the top, and its horns pass for the apex."""
     ridge = rf.register(tube(seed, height), at=(0, 0, height))
-    rises = np.sign(np.diff(ridge.section(np.linspace(-0.5, 0.5, 1001))))
-    assert (np.diff(rises[rises != 0]) < 0).sum() == 1
+    steps = np.diff(ridge.section(np.linspace(-0.5, 0.5, 1001)))
+    rises = np.sign(steps[np.abs(steps) > 1e-12])  # what is level is so to the last bits alone
+    assert (np.diff(rises) < 0).sum() == 1
     assert np.median(ridge.height) == pytest.approx(height, rel=0.005)
     assert abs(np.median(ridge.height) - height) < 3 * np.median(ridge.height_std)
     assert np.median(ridge.half_height_width) == pytest.approx(6.0, rel=0.03)
