@@ -23,6 +23,8 @@ _BESIDE_IT = -1, 1, -0.5, 0.5, -2, 2
 """Steps of it from the width of a ridge that has the pick at its foot, at which the one that is meant is."""
 _FOOT, _CREST = 0.45, 0.3
 """Distances from the spine in widths: at the foot; on the crest."""
+_PAST = 0.5
+"""Widths past an end up to which a pick is on the ridge: ends are known to that."""
 _OFF = 0.3
 """Distance from the surface, in heights, up to which a pick is on a ridge."""
 _ALIKE, _SURE = 0.1, 2
@@ -111,7 +113,7 @@ def _same(one: Ridge, other: Ridge) -> bool:
 def _has_pick(ridge: Ridge, aside: float) -> bool:
     """Whether the pick lies on the surface and between the ends, and no more widths aside of the spine."""
     s, y, z = place = place_of_pick(ridge)
-    if not is_beside(ridge, place, aside):
+    if not is_beside(ridge, place, aside, _PAST):
         return False
     width = float(np.interp(s, ridge.arc_length, ridge.width))
     off = _OFF * median(np.abs(ridge.height))

@@ -19,7 +19,7 @@ feet; and by how much their shares of strays may differ."""
 _TOGETHER, _FEW, _SURE = 5, 16, 3.0
 """Stretches whose strays are counted together; points on a side below which nothing is said of it; standard
 deviations that a difference of shares must have to spare."""
-_ASIDE, _BEYOND = 0.5, 0.5
+_ASIDE, _BEYOND = 0.5, 0.3
 """Widths beyond the feet, and beyond an end, from which on a pick is not on the ridge."""
 
 
@@ -83,7 +83,7 @@ def to_one_side(ridge: Ridge, edges: Array, s: Array, across: Array, side: Array
 def pick_missed(ridge: Ridge) -> tuple[float, float] | None:
     """How far the pick lies from the spine, in the unit and in widths; None where it is on the ridge."""
     s, _, _ = place = place_of_pick(ridge)
-    if is_beside(ridge, place, 0.5 + _ASIDE):
+    if is_beside(ridge, place, 0.5 + _ASIDE, _BEYOND):
         return None
     far = float(np.linalg.norm(ridge.spine - ridge.pick, axis=1).min())
     return far, far / float(np.interp(s, ridge.arc_length, ridge.width))
@@ -95,13 +95,12 @@ def place_of_pick(ridge: Ridge) -> tuple[float, float, float]:
     return s, y, z
 
 
-def is_beside(ridge: Ridge, place: tuple[float, float, float], aside: float) -> bool:
-    """Whether a place is at most so many widths aside of the spine, and no further past an end than a pick
-    may be."""
+def is_beside(ridge: Ridge, place: tuple[float, float, float], aside: float, beyond: float) -> bool:
+    """Whether a place is at most so many widths aside of the spine, and past an end."""
     s, y, _ = place
     width = float(np.interp(s, ridge.arc_length, ridge.width))
-    beyond = 0.0 if ridge.closed else max(-s, s - ridge.length)
-    return abs(y) <= aside * width and beyond <= _BEYOND * width
+    past = 0.0 if ridge.closed else max(-s, s - ridge.length)
+    return abs(y) <= aside * width and past <= beyond * width
 
 
 def _about(at: NDArray[np.intp], count: int) -> Array:

@@ -28,6 +28,12 @@ def aside(share: float, height: float = 0.0, length: float | None = None) -> rf.
     )
 
 
+def past(share: float) -> rf.Ridge:
+    """The ridge, picked so many widths past its end."""
+    ridge = spiral_ridge()
+    return replace(ridge, pick=ridge.spine[-1] + share * ridge.width[-1] * ridge.tangent[-1])
+
+
 class Attempts:
     """Answers in turn; what was asked is kept."""
 
@@ -42,16 +48,15 @@ class Attempts:
         return answer
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, -0.4])
-def test_a_pick_on_crest_or_flank_means_what_is_found(share):
-    found = aside(share)
+@pytest.mark.parametrize("found", [aside(0.0), aside(0.2), aside(-0.4), past(0.4)])
+def test_a_pick_on_crest_or_flank_or_just_past_an_end_means_what_is_found(found):
     tried = Attempts(found)
     assert ridge_meant(tried, EXTENT, Hints()) is found
     assert tried.asked == [(None, True, False)]
 
 
-@pytest.mark.parametrize("first", [aside(0.5), aside(-0.7), aside(0.1, height=0.5)])
-def test_at_a_foot_or_off_the_surface_another_ridge_is_looked_for(first):
+@pytest.mark.parametrize("first", [aside(0.5), aside(-0.7), aside(0.1, height=0.5), past(0.6)])
+def test_at_a_foot_off_the_surface_or_further_past_an_end_another_ridge_is_looked_for(first):
     meant = aside(0.1)
     tried = Attempts(first, rf.NoRidgeError("too slim"), aside(0.4), meant)
     assert ridge_meant(tried, EXTENT, Hints()) is meant
