@@ -133,6 +133,7 @@ def test_files_that_are_sent_and_parts_that_are_shown(tmp_path: Path) -> None:
         page.click("#paste")
         page.wait_for_function("() => document.querySelector('#part-note').innerText.includes('checked')")
         set_slider(page, "h", 1.4)
+        page.wait_for_function("() => document.querySelector('#height').value > 4")  # sent a little later
         page.click("text=Back to the scan")
         page.wait_for_selector(".plot")
         download.value.save_as(tmp_path / "kept.ridgepage")

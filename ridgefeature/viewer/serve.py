@@ -117,6 +117,7 @@ def _markup(server: Any, scene: Scene, files: list[str]) -> Any:
 
     own = {"naming": "", "units": list(MILLIMETRES), "trame__title": "ridgefeature"}
     server.state.update(TOLD | own | {"files": files})
+    server.state.client_only("naming")
     server.enable_module(
         {"serve": {"own": str(_HERE / "assets")}, "scripts": ["own/page.js"], "styles": ["own/page.css"]}
     )
