@@ -88,7 +88,7 @@ def no_whole_ridge(
     return (
         unknown_height(stations)
         or too_large(stations.height, stations.width, extent, settings)
-        or too_short(stations.arc_length[-1] - stations.arc_length[0], stations.width, stop, settings)
+        or too_short(float(stations.arc_length[-1]), stations.width, stop, settings)
     )
 
 
